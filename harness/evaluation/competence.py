@@ -8,27 +8,32 @@ game that could be played. A goal of an ego that passed a red light, or drove am
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from harness.evaluation.research_questions import AloneBound, Verdict
+from harness.evaluation.rule_book.thresholds import WRONG_WAY_LEAST_S
 
 if TYPE_CHECKING:
     import pandas as pd
 
 DID_NOT_LEARN = "did not learn"
 """How a training ended whose player misses its bound alone, whatever stopped it."""
-RULES: Mapping[str, str] = {"on_red": "passing a red light", "wrong_way": "driving among oncoming lanes"}
-"""The rules that an ego must keep, by the key of the games in which it broke them, with their words."""
+RULES: Mapping[str, tuple[str, str, float]] = {
+    "on_red": ("passing a red light", "ego_red_lights", 1.0),
+    "wrong_way": ("driving among oncoming lanes", "ego_wrong_way_s", WRONG_WAY_LEAST_S),
+}
+"""The rules that an ego must keep, by the key of the games in which it broke them: its words, and the column of
+episodes.csv with the least value that breaks it."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Goals:
-    """How often a player reached its goal in the games of an arm."""
+    """How often a player reached its goal in the games of an arm; the keys of an entry of a manifest."""
 
     goals: int
-    games: int
+    played: int
     """Games that could be played."""
     on_red: int = 0
     """Games in which an ego reached its goal, but passed a red light: they are no goals."""
@@ -38,32 +43,24 @@ class Goals:
     @classmethod
     def recorded(cls, entry: Mapping[str, Any]) -> Goals:
         """The goals that an entry of a manifest records."""
-        against_rules = {rule: entry.get(rule, 0) for rule in RULES}
-        return cls(goals=entry["goals"], games=entry["played"], **against_rules)
+        return cls(**{name: entry[name] for name in cls.__dataclass_fields__ if name in entry})
 
     def record(self) -> dict[str, int]:
         """The keys of a manifest's entry; without those of rules that were not broken."""
-        against_rules = {rule: count for rule in RULES if (count := getattr(self, rule))}
-        return {"goals": self.goals, "played": self.games} | against_rules
-
-    @property
-    def share(self) -> float:
-        """Share of the games; 0 without games."""
-        return self.goals / self.games if self.games else 0.0
+        return {name: count for name, count in vars(self).items() if count or name not in RULES}
 
     def suffice(self, least_share: float) -> bool:
         """Whether there are games, and their share of goals is not below this."""
-        return self.games > 0 and self.share >= least_share
+        return self.played > 0 and self.goals / self.played >= least_share
 
     def below(self, least_share: float) -> str:
         """The share and its bound, as a clause."""
-        counts = (
-            f"{self.goals} of {self.games} games ({int(self.share * 1000) / 10:g} %)"  # rounded down: below stays below
+        percent = int(self.goals / max(self.played, 1) * 1000) / 10  # rounded down: below stays below
+        broken = "".join(
+            f", and in {vars(self)[rule]} more after {words}" for rule, (words, *_) in RULES.items() if vars(self)[rule]
         )
-        broken = [
-            f", and in {getattr(self, rule)} more after {words}" for rule, words in RULES.items() if getattr(self, rule)
-        ]
-        return f"alone it reaches its goal in {counts}{''.join(broken)}, below {round(least_share * 100, 10):g} %"
+        counts = f"{self.goals} of {self.played} games ({percent:g} %){broken}"
+        return f"alone it reaches its goal in {counts}, below {round(least_share * 100, 10):g} %"
 
 
 def goals_alone(games: pd.DataFrame | None, player: Literal["ego", "non_ego"]) -> Goals:
@@ -73,72 +70,56 @@ def goals_alone(games: pd.DataFrame | None, player: Literal["ego", "non_ego"]) -
     An ego that breaks one of `RULES` can't drive the scene. Persons may: some are made for it.
     """
     from harness.evaluation.people import outcomes_of_people
-    from harness.evaluation.rule_book.thresholds import WRONG_WAY_LEAST_S
 
     if games is None:
-        return Goals(goals=0, games=0)
+        return Goals(goals=0, played=0)
     outcome = games["ego_outcome"].fillna("") if player == "ego" else outcomes_of_people(games)
     played = (games["error"].fillna("") == "") & ~outcome.isin(["", "error"])
-    reached = played & (outcome == "goal")
-    on_red = reached & _at_least(games, "ego_red_lights", 1.0) & (player == "ego")
-    wrong_way = reached & ~on_red & _at_least(games, "ego_wrong_way_s", WRONG_WAY_LEAST_S) & (player == "ego")
-    goals = reached & ~on_red & ~wrong_way
-    return Goals(
-        goals=int(goals.sum()), games=int(played.sum()), on_red=int(on_red.sum()), wrong_way=int(wrong_way.sum())
-    )
+    goals, broken = played & (outcome == "goal"), {}
+    for rule, (_, column, least) in RULES.items() if player == "ego" else ():
+        breaks = goals & (games[column].fillna(0.0) >= least)
+        broken[rule], goals = int(breaks.sum()), goals & ~breaks
+    return Goals(goals=int(goals.sum()), played=int(played.sum()), **broken)
 
 
 def broken_by(record: Mapping[str, Any]) -> str:
     """The key of the rule of `RULES` that the ego broke in a game, from its cells of episodes.csv; empty if none."""
-    from harness.evaluation.rule_book.thresholds import WRONG_WAY_LEAST_S
-
-    if (record.get("ego_red_lights") or 0.0) >= 1.0:
-        return "on_red"
-    return "wrong_way" if (record.get("ego_wrong_way_s") or 0.0) >= WRONG_WAY_LEAST_S else ""
-
-
-def _at_least(games: pd.DataFrame, column: str, least: float) -> Any:
-    """Which games have at least this in a column; none, if the table has no such column."""
-    return games[column].fillna(0.0) >= least if column in games else False
+    return next((rule for rule, (_, column, least) in RULES.items() if (record.get(column) or 0.0) >= least), "")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Gate:
-    """Why a question is not answered."""
+    """Why a question is not answered, as cells of a table; both are empty if it is."""
 
-    verdict: Verdict
+    verdict: str = ""
     """One of `INCOMPETENT`."""
-    reason: str
+    reason: str = ""
     """Each player below its bound, with its share; a sentence without a capital letter and a full stop."""
 
 
-def gate(bounds: Iterable[AloneBound], seed: int, games: Mapping[Any, pd.DataFrame]) -> Gate | None:
-    """The reason why a verdict on these players does not count; None if it counts.
+def gate(bounds: Iterable[AloneBound], seed: int, games: Mapping[Any, pd.DataFrame]) -> Gate:
+    """Why a verdict on these players does not count, if it does not.
 
     `games` are the rows of episodes.csv by (arm, seed). A bound of 0 is always met.
     """
-    measured = [
-        (bound, goals_alone(games.get((bound.arm, seed)), bound.player)) for bound in bounds if bound.goal_share > 0
-    ]
-    below = [(bound, goals) for bound, goals in measured if not goals.suffice(bound.goal_share)]
-    if not below:
-        return None
-    incapable = {bound.player for bound, goals in below if goals.games}
+    incapable, clauses = set(), []
+    for bound in bounds:
+        if bound.goal_share == 0:
+            continue
+        goals = goals_alone(games.get((bound.arm, seed)), bound.player)
+        if goals.suffice(bound.goal_share):
+            continue
+        if goals.played:
+            incapable.add(bound.player)
+            clauses.append(f"{bound.words} can't drive this scene: {goals.below(bound.goal_share)}")
+        else:
+            unknown = f"so it is not known how {bound.words} drives"
+            clauses.append(f"no game of the arm {bound.arm} could be played, {unknown}")
+    if not clauses:
+        return Gate()
     verdict = {
         frozenset({"ego"}): Verdict.EGO_CANNOT_DRIVE,
         frozenset({"non_ego"}): Verdict.NON_EGO_CANNOT_DRIVE,
         frozenset({"ego", "non_ego"}): Verdict.NEITHER_CAN_DRIVE,
     }.get(frozenset(incapable), Verdict.NOT_PLAYED_ALONE)
-    return Gate(verdict=verdict, reason=_reason(below))
-
-
-def _reason(below: Sequence[tuple[AloneBound, Goals]]) -> str:
-    clauses = []
-    for bound, goals in below:
-        if goals.games:
-            clauses.append(f"{bound.words} can't drive this scene: {goals.below(bound.goal_share)}")
-        else:
-            clauses.append(
-                f"no game of the arm {bound.arm} could be played, so it is not known how {bound.words} drives"
-            )
-    return "; ".join(dict.fromkeys(clauses))
+    return Gate(verdict=verdict.value, reason="; ".join(dict.fromkeys(clauses)))

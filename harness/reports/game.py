@@ -7,7 +7,7 @@ from typing import Any
 
 import pandas as pd
 
-from harness.evaluation.game_theory.records import GameFindings
+from harness.evaluation.game_theory.findings import GameFindings
 from harness.evaluation.research_questions import Verdict
 from harness.reports.data_table import table
 from harness.reports.game_links import GameLinks

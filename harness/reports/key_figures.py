@@ -57,7 +57,7 @@ def _preventable(persona: str, tables: RunTables) -> Iterator[KeyFigure]:
     naive, _ = tables.arms_of("RQ2", persona)
     for each in tables.prevented_in(naive):
         if each.failures:
-            count = f"{each.from_start.by_any} of {each.from_start.judged} failures of the {tables.naive}"
+            count = f"{each.prevented} of {each.judged} failures of the {tables.naive}"
             rate = f"{percent(each.rate)} of its games, {sure(each.rate_low, each.rate_high)}"
             lines.append(f"{_seed(each.seed, tables)}{count} by a reference driver in its seat ({rate})")
     yield KeyFigure(title="Preventable", lines=lines)

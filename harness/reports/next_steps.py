@@ -140,8 +140,8 @@ def _prevented(tables: RunTables) -> list[str]:
     lines: list[str] = []
     all_avoided, all_failures = 0, 0
     for persona, arm in arms.items():
-        judged = [each.from_start for each in tables.prevented_in(arm)]
-        avoided, failed = sum(each.by_any for each in judged), sum(each.judged for each in judged)
+        judged = tables.prevented_in(arm)
+        avoided, failed = sum(each.prevented for each in judged), sum(each.judged for each in judged)
         if failed and lines:
             lines.append(f"Against {persona}: {avoided} of {failed}.")
         elif failed:

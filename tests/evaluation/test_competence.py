@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 from harness.evaluation.comparisons.comparison import compare, games_by_arm
-from harness.evaluation.competence import Goals, gate, goals_alone
+from harness.evaluation.competence import Gate, Goals, gate, goals_alone
 from harness.evaluation.research_questions import INCOMPETENT, AloneBound, Question, Verdict
 
 EGO = AloneBound(player="ego", words="the naive ego", arm="naive_alone", goal_share=0.97)
@@ -36,6 +36,8 @@ def arm(name: str, *, ego: list[str] | None = None, non_ego: list[str] | None = 
             "ego_failed": pd.array([WRECK[each] for each in outcomes["ego"]], dtype="Int64"),
             "ego_mean_speed_mps": [12.0 + 0.1 * place for place in range(count)],
             "non_ego_outcome": outcomes["non_ego"],
+            "ego_red_lights": 0.0,
+            "ego_wrong_way_s": 0.0,
             "error": ["it died" if "error" in pair else "" for pair in either],
         }
     )
@@ -66,15 +68,15 @@ def compared(episodes: pd.DataFrame, *questions: Question) -> list[dict[str, obj
 
 def test_goals__are_counted_over_the_games_that_could_be_played() -> None:
     games = arm("speedy_alone", non_ego=["goal", "rail", "error", "goal"])
-    assert goals_alone(games, "non_ego") == Goals(goals=2, games=3)
-    assert goals_alone(games, "ego") == Goals(goals=0, games=0)  # it does not take part
-    assert goals_alone(None, "ego") == Goals(goals=0, games=0)
+    assert goals_alone(games, "non_ego") == Goals(goals=2, played=3)
+    assert goals_alone(games, "ego") == Goals(goals=0, played=0)  # it does not take part
+    assert goals_alone(None, "ego") == Goals(goals=0, played=0)
 
 
 def test_goals__of_an_ego_on_red_do_not_count() -> None:
     games = arm("naive_alone", ego=["goal", "goal", "goal", "rail"]).assign(ego_red_lights=[0.0, 1.0, None, 2.0])
     goals = goals_alone(games, "ego")
-    assert goals == Goals(goals=2, games=4, on_red=1)
+    assert goals == Goals(goals=2, played=4, on_red=1)
     assert goals.below(0.97) == (
         "alone it reaches its goal in 2 of 4 games (50 %), and in 1 more after passing a red light, below 97 %"
     )
@@ -85,7 +87,7 @@ def test_goals__of_an_ego_among_oncoming_lanes_do_not_count() -> None:
         ego_red_lights=[0.0, 1.0, 0.0, 0.0], ego_wrong_way_s=[0.9, 3.0, 1.0, 8.0]
     )
     goals = goals_alone(games, "ego")
-    assert goals == Goals(goals=1, games=4, on_red=1, wrong_way=1)
+    assert goals == Goals(goals=1, played=4, on_red=1, wrong_way=1)
     assert goals.below(0.97) == (
         "alone it reaches its goal in 1 of 4 games (25 %), and in 1 more after passing a red light, "
         "and in 1 more after driving among oncoming lanes, below 97 %"
@@ -95,15 +97,15 @@ def test_goals__of_an_ego_among_oncoming_lanes_do_not_count() -> None:
 
 @pytest.mark.parametrize(("reached", "enough"), [(97, True), (96, False), (100, True), (0, False)])
 def test_goals__suffice_from_the_bound_on(reached: int, enough: bool) -> None:
-    assert Goals(goals=reached, games=100).suffice(0.97) == enough
+    assert Goals(goals=reached, played=100).suffice(0.97) == enough
 
 
 def test_goals__none_of_no_games_suffice() -> None:
-    assert not Goals(goals=0, games=0).suffice(0.97)
+    assert not Goals(goals=0, played=0).suffice(0.97)
 
 
 def test_goals__a_share_below_its_bound_is_never_shown_as_the_bound() -> None:
-    text = Goals(goals=969_999, games=1_000_000).below(0.97)
+    text = Goals(goals=969_999, played=1_000_000).below(0.97)
     assert text == "alone it reaches its goal in 969999 of 1000000 games (96.9 %), below 97 %"
 
 
@@ -113,21 +115,19 @@ def test_goals__a_share_below_its_bound_is_never_shown_as_the_bound() -> None:
 @pytest.mark.parametrize(
     ("ego", "person", "verdict"),
     [
-        (97, 80, None),
+        (97, 80, ""),
         (96, 80, Verdict.EGO_CANNOT_DRIVE),
         (97, 79, Verdict.NON_EGO_CANNOT_DRIVE),
         (0, 0, Verdict.NEITHER_CAN_DRIVE),
     ],
 )
-def test_gate__names_who_cannot_drive(ego: int, person: int, verdict: Verdict | None) -> None:
-    closed = gate(RQ1.alone, 1, games_by_arm(table(ego, person)))
-    assert (closed.verdict if closed is not None else None) == verdict
+def test_gate__names_who_cannot_drive(ego: int, person: int, verdict: str) -> None:
+    assert gate(RQ1.alone, 1, games_by_arm(table(ego, person))).verdict == verdict
 
 
 def test_gate__the_reason_has_the_player_its_share_and_the_bound() -> None:
     closed = gate(RQ1.alone, 1, games_by_arm(table(100, 3)))
-    assert closed is not None
-    assert closed.verdict.value == "not answered: the person can't drive this scene"
+    assert closed.verdict == "not answered: the person can't drive this scene"
     assert closed.reason == (
         "the speedy driver can't drive this scene: alone it reaches its goal in 3 of 100 games (3 %), below 80 %"
     )
@@ -136,22 +136,20 @@ def test_gate__the_reason_has_the_player_its_share_and_the_bound() -> None:
 def test_gate__players_that_were_not_played_alone_are_not_taken_on_trust() -> None:
     episodes = table(100, 100)
     closed = gate(RQ1.alone, 1, games_by_arm(episodes[episodes["arm"] != "speedy_alone"]))
-    assert closed is not None
-    assert closed.verdict is Verdict.NOT_PLAYED_ALONE
+    assert closed.verdict == Verdict.NOT_PLAYED_ALONE.value
     assert "no game of the arm speedy_alone could be played" in closed.reason
 
 
 def test_gate__a_bound_of_0_asks_nothing() -> None:
     free = [AloneBound(player="ego", words="the naive ego", arm="naive_alone", goal_share=0.0)]
-    assert gate(free, 1, {}) is None
-    assert gate([], 1, {}) is None
+    assert gate(free, 1, {}) == gate([], 1, {}) == Gate()
 
 
 def test_gate__is_asked_for_each_seed() -> None:
     good, bad = table(100, 100), table(100, 0).assign(seed=2)
     games = games_by_arm(pd.concat([good, bad], ignore_index=True))
-    assert gate(RQ1.alone, 1, games) is None
-    assert gate(RQ1.alone, 2, games) is not None
+    assert not gate(RQ1.alone, 1, games).reason
+    assert gate(RQ1.alone, 2, games).reason
 
 
 # --- comparisons ------------------------------------------------------------------------------------------------------

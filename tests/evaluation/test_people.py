@@ -78,7 +78,7 @@ def test_summary__people_one_at_a_time_have_an_interval() -> None:
     assert row["non_ego_goal_rate"] == 1.0
     assert row["non_ego_goal_rate_low"] == pytest.approx(0.025 ** (1 / 3))
     found = goals_alone(table, "non_ego")
-    assert (found.goals, found.games) == (3, 3)
+    assert (found.goals, found.played) == (3, 3)
 
 
 def test_manoeuvres__name_the_person_and_before_which_player(tmp_path: Path) -> None:

@@ -16,14 +16,14 @@ from harness.campaign.results.population_summary import by_who_drove
 from harness.campaign.results.read_run import ReadRun
 from harness.campaign.storage.learned import judged
 from harness.campaign.storage.manifest import is_tuned
-from harness.evaluation.comparisons.acceptance_checks import Evidence, unanswered
+from harness.evaluation.comparisons.acceptance_checks import Evidence
 from harness.evaluation.comparisons.comparison import compare, games_by_arm
 from harness.evaluation.comparisons.preventability import count_prevented
 from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.competence import Goals, goals_alone
-from harness.evaluation.game_theory.findings import find
-from harness.evaluation.game_theory.records import GameFindings
+from harness.evaluation.game_theory.findings import GameFindings, find
 from harness.evaluation.research_questions import Question
+from harness.evaluation.tables import table_of
 from harness.reports.run_tables import RunTables
 
 
@@ -59,9 +59,9 @@ def evaluated(run: ReadRun) -> RunTables:
         arms=tables.arms,
         episodes=tables.episodes,
         summary=tables.summary,
-        gaps=tables.game.gaps if tables.game is not None else None,
+        comparisons=tables.comparisons,
+        gaps=tables.game.gaps if tables.game is not None else table_of("gaps"),
         preventability=tables.preventability if run.reference_drivers is not None else None,
-        unanswered=unanswered(tables.comparisons),
     )
     return replace(tables, acceptance=checks_of(run.campaign, run.manifest["personas"], evidence))
 

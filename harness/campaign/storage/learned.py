@@ -38,7 +38,7 @@ def judged(
             continue
         bound = bound_of(campaign, stage)
         alone = goals.get(stage_id(bound.arm, stage.seed)) if bound is not None else None
-        if bound is None or alone is None or not alone.games:
+        if bound is None or alone is None or not alone.played:
             continue
         found[stage.id] |= alone.record() | {"goal_share_asked": bound.goal_share}
         if not alone.suffice(bound.goal_share):

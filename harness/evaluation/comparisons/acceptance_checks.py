@@ -15,15 +15,15 @@ are compatible with a failure rate of 31 %, and don't show that it is below 10 %
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
 
-from harness.evaluation.comparisons.comparison import games_by_arm, mean_interval, pairs_of, rate_interval
+from harness.evaluation.comparisons.comparison import games_by_arm, mean_interval, pairs_of
 from harness.evaluation.comparisons.preventability import ANY
 from harness.evaluation.strategies import (
     Arm,
@@ -71,7 +71,7 @@ class Check:
 
     @property
     def excess(self) -> float:
-        """By how much the limit is above the bound: the larger, the worse. Infinite where it could not be measured."""
+        """By how much the limit is above the bound; infinite where it could not be measured."""
         return self.limit - self.allowed if self.measured else np.inf
 
 
@@ -82,11 +82,10 @@ class Evidence:
     arms: Mapping[str, Arm]
     episodes: pd.DataFrame
     summary: pd.DataFrame
-    gaps: pd.DataFrame | None = None
+    comparisons: pd.DataFrame
+    gaps: pd.DataFrame
     preventability: pd.DataFrame | None = None
     """None: no failure was judged by reference drivers."""
-    unanswered: Collection[tuple[str, int]] = ()
-    """Personas and seeds with a question that is not answered, because a player can't drive the scene."""
 
     @cached_property
     def rows(self) -> Mapping[tuple[str, int], Mapping[Any, Any]]:
@@ -97,6 +96,11 @@ class Evidence:
     def games(self) -> Mapping[Any, pd.DataFrame]:
         """The rows of episodes.csv by arm and seed."""
         return games_by_arm(self.episodes)
+
+    def unanswered(self, persona: str, seed: int) -> bool:
+        """Whether a question is not answered, because a player can't drive the scene: its row states a reason."""
+        asked = (self.comparisons["persona"] == persona) & (self.comparisons["seed"] == seed)
+        return bool((asked & (self.comparisons["reason"] != "")).any())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,44 +121,29 @@ def judge(
 ) -> list[Check]:
     """Every bound for every persona and training seed: one check for each arm that it is measured in.
 
-    `bounds` are keys of `MEASURES` with their values. A bound that can't be measured has a check with NaN, which does
-    not pass; so has every bound about players of which one can't drive the scene.
+    `bounds` are the bounds of the table above with their values. A bound that can't be measured has a check with NaN,
+    which does not pass; so has every bound about players of which one can't drive the scene.
     """
     checks = []
     for name, allowed in bounds.items():
         for persona in personas:
             for seed in seeds:
                 subject = Subject(ego=judged_ego(judged, persona, seed, evidence), persona=persona, seed=seed)
-                for arm, value, limit, games in MEASURES[name](subject, evidence):
-                    if (persona, seed) in evidence.unanswered:
+                check = partial(Check, bound=name, persona=persona, seed=seed, allowed=allowed)
+                for arm, value, limit, games in _measured(name, subject, evidence):
+                    if evidence.unanswered(persona, seed):
                         value = limit = np.nan
-                    check = Check(
-                        bound=name,
-                        persona=persona,
-                        seed=seed,
-                        arm=arm,
-                        value=value,
-                        limit=limit,
-                        allowed=allowed,
-                        games=games,
-                    )
-                    checks.append(check)
+                    checks.append(check(arm=arm, value=value, limit=limit, games=games))
     return checks
-
-
-def unanswered(comparisons: pd.DataFrame) -> frozenset[tuple[str, int]]:
-    """Personas and seeds with a question that is not answered: those rows of comparisons.csv that state a reason."""
-    rows = comparisons[comparisons["reason"] != ""]
-    return frozenset(zip(rows["persona"], rows["seed"], strict=True))
 
 
 def worst_of_each(checks: Sequence[Check]) -> list[Check]:
     """For each bound and persona the check with the largest excess, in the order of the checks."""
     worst: dict[tuple[str, str], Check] = {}
     for check in checks:
-        key = (check.bound, check.persona)
-        if key not in worst or check.excess > worst[key].excess:
-            worst[key] = check
+        known = worst.setdefault((check.bound, check.persona), check)
+        if check.excess > known.excess:
+            worst[check.bound, check.persona] = check
     return list(worst.values())
 
 
@@ -171,38 +160,26 @@ def judged_ego(judged: JudgedEgo, persona: str, seed: int, evidence: Evidence) -
         if isinstance(arm.ego, RetrainedEgo | ReconfiguredEgo) and arm.ego.against == persona
     }
     assessed = [ego for ego, found in planned.items() if found]
-    later = sorted(assessed or planned, key=round_of)
-    if not later:
-        return NaiveEgo()
-    return later[-1] if assessed else later[0]
+    if assessed:
+        return max(assessed, key=round_of)
+    return min(planned, key=round_of, default=NaiveEgo())
 
 
-def _failure_rate(subject: Subject, evidence: Evidence) -> Iterator[Measured]:
-    for arm in _arms_against(subject, evidence):
-        yield _rate(arm, subject.seed, evidence)
-
-
-def _preventable_failure_rate(subject: Subject, evidence: Evidence) -> Iterator[Measured]:
-    judged = [] if evidence.preventability is None else evidence.preventability.to_dict("records")
-    found = {(row["arm"], row["seed"]): row for row in judged if row["driver"] == ANY}
-    for arm in _arms_against(subject, evidence):
-        _, failure_rate, failure_limit, games = _rate(arm, subject.seed, evidence)
-        row = found.get((arm, subject.seed))
-        if row is not None:
-            yield arm, row["from_start_rate"], row["from_start_rate_high"], games
-        elif evidence.preventability is not None and failure_rate == 0.0:
-            yield arm, 0.0, failure_limit, games
-        else:
-            yield arm, np.nan, np.nan, 0
-
-
-def _near_miss_rate(subject: Subject, evidence: Evidence) -> Iterator[Measured]:
-    for arm in _arms_against(subject, evidence):
-        games = evidence.games.get((arm, subject.seed))
-        known = games["near_miss"].dropna() if games is not None and "near_miss" in games else []
-        near = int(sum(known))
-        _, high = rate_interval(near, len(known))
-        yield arm, near / len(known) if len(known) else np.nan, high, len(known)
+def _measured(bound: str, subject: Subject, evidence: Evidence) -> Iterator[Measured]:
+    """A bound in each arm of a subject."""
+    match bound:
+        case "failure_rate_alone":
+            yield _rate("failure_rate", Arm(ego=subject.ego).name, subject.seed, evidence)
+        case "speed_loss_mps":
+            yield _speed_loss(subject, evidence)
+        case "gap_share":
+            yield from _gap_shares(subject, evidence)
+        case _:
+            for arm in _arms_against(subject, evidence):
+                if bound == "preventable_failure_rate":
+                    yield _preventable(arm, subject.seed, evidence)
+                else:
+                    yield _rate(bound, arm, subject.seed, evidence)
 
 
 def _arms_against(subject: Subject, evidence: Evidence) -> list[str]:
@@ -218,48 +195,40 @@ def _arms_against(subject: Subject, evidence: Evidence) -> list[str]:
     return arms or [against_persona(subject.ego, subject.persona).name]
 
 
-def _failure_rate_alone(subject: Subject, evidence: Evidence) -> Iterator[Measured]:
-    yield _rate(Arm(ego=subject.ego).name, subject.seed, evidence)
-
-
-def _rate(arm: str, seed: int, evidence: Evidence) -> Measured:
+def _rate(column: str, arm: str, seed: int, evidence: Evidence) -> Measured:
+    """A rate of summary.csv, with the upper end of its interval."""
     row = evidence.rows.get((arm, seed))
     if row is None:
         return arm, np.nan, np.nan, 0
-    return arm, row["failure_rate"], row["failure_rate_high"], row["episodes"] - row["errors"]
+    return arm, row[column], row[f"{column}_high"], row["episodes"] - row["errors"]
 
 
-def _speed_loss(subject: Subject, evidence: Evidence) -> Iterator[Measured]:
+def _preventable(arm: str, seed: int, evidence: Evidence) -> Measured:
+    _, failure_rate, failure_limit, games = _rate("failure_rate", arm, seed, evidence)
+    judged = evidence.preventability
+    if judged is None:
+        return arm, np.nan, np.nan, 0
+    for row in judged[(judged["arm"] == arm) & (judged["seed"] == seed)].to_dict("records"):
+        if row["driver"] == ANY:
+            return arm, row["from_start_rate"], row["from_start_rate_high"], games
+    return (arm, 0.0, failure_limit, games) if failure_rate == 0.0 else (arm, np.nan, np.nan, 0)
+
+
+def _speed_loss(subject: Subject, evidence: Evidence) -> Measured:
     naive, judged = (against_persona(ego, subject.persona).name for ego in (NaiveEgo(), subject.ego))
     before, after, _ = pairs_of(evidence.games, subject.seed, naive, judged, ["ego_mean_speed_mps"])
     losses = (before - after)[:, 0]
     value = float(losses.mean()) if len(losses) else np.nan
     _, high = mean_interval(losses)
-    yield judged, value, high if np.isfinite(high) else value, len(losses)
+    return judged, value, high if np.isfinite(high) else value, len(losses)
 
 
-def _gap_share(subject: Subject, evidence: Evidence) -> Iterator[Measured]:
-    ego = strategy_name(subject.ego)
-    rows = [] if evidence.gaps is None else evidence.gaps.to_dict("records")
-    found = [
-        row
-        for row in rows
-        if (row["role"], row["ego"], row["persona"], row["seed"]) == ("ego", ego, subject.persona, subject.seed)
-    ]
-    for row in found:
-        scale = abs(row["payoff"]) or np.nan
-        high = row["ci_high"] if np.isfinite(row["ci_high"]) else row["gap"]
-        yield f"{ego}_vs_{row['non_ego']}", row["gap"] / scale, high / scale, row["pairs"]
+def _gap_shares(subject: Subject, evidence: Evidence) -> Iterator[Measured]:
+    ego, found = strategy_name(subject.ego), False
+    for row in evidence.gaps.to_dict("records"):
+        if (row["role"], row["ego"], row["persona"], row["seed"]) == ("ego", ego, subject.persona, subject.seed):
+            scale, found = abs(row["payoff"]) or np.nan, True
+            high = row["ci_high"] if np.isfinite(row["ci_high"]) else row["gap"]
+            yield f"{ego}_vs_{row['non_ego']}", row["gap"] / scale, high / scale, row["pairs"]
     if not found:
         yield against_persona(subject.ego, subject.persona).name, np.nan, np.nan, 0
-
-
-MEASURES: Mapping[str, Callable[[Subject, Evidence], Iterator[Measured]]] = {
-    "failure_rate": _failure_rate,
-    "failure_rate_alone": _failure_rate_alone,
-    "preventable_failure_rate": _preventable_failure_rate,
-    "near_miss_rate": _near_miss_rate,
-    "speed_loss_mps": _speed_loss,
-    "gap_share": _gap_share,
-}
-"""How each bound is measured."""

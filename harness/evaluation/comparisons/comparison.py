@@ -30,7 +30,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 import scipy  # loads `scipy.stats` at its first use: workers do without
 
@@ -38,12 +37,10 @@ from harness.evaluation.columns import TABLES
 from harness.evaluation.competence import Gate, gate
 from harness.evaluation.research_questions import Question, ResearchQuestion, Verdict
 from harness.evaluation.tables import typed
-
-Floats = npt.NDArray[np.float64]
+from harness.game.arrays import FloatArray
 
 CONFIDENCE = 0.95
 """The confidence of every interval in the tables; it does not depend on the campaign's significance."""
-
 ROUNDING = 1e-12
 """Differences with a spread below this share of the largest value count as equal: otherwise the rounding of
 0.3 - 0.2 against 0.2 - 0.1 would give a tiny standard deviation and a huge t."""
@@ -74,25 +71,40 @@ def compare(questions: Iterable[Question], episodes: pd.DataFrame, significance:
     size are NaN, the row is not in Holm's family, and `rejects_h0` is false. The same holds for a question whose
     players miss a bound of `Question.alone`.
 
-    Raises ValueError when significance is not in (0, 1), or when an arm has two games for one episode.
+    Raises ValueError when an arm has two games for one episode.
     """
-    if not 0 < significance < 1:
-        raise ValueError(f"significance must be between 0 and 1, not {significance}")
     games = games_by_arm(episodes)
     rows = [
-        _row(question, metric, games, closed)
+        _row(question, metric, games, gate(question.alone, question.seed, games))
         for question in questions
-        for closed in [gate(question.alone, question.seed, games)]
         for metric in METRICS
     ]
     table = pd.DataFrame(rows, columns=list(TABLES["comparisons"]))
-    table["p_holm"] = holm(table["p_value"].to_numpy(dtype=np.float64))
     table["rejects_h0"] = table["p_value"].astype("float64") < significance
-    table["verdict"] = [verdict_of(row, significance).value for row in table.to_dict("records")]
-    return typed(table)
+    return typed(with_verdicts(table, significance))
 
 
-def holm(p_values: Floats) -> Floats:
+def with_verdicts(table: pd.DataFrame, significance: float, difference: str = "mean_difference") -> pd.DataFrame:
+    """A table with Holm's correction over all of its p-values, and the verdict of each row by its pairs, p-values and
+    difference. A row that has a verdict keeps it: that of a closed gate."""
+    table = table.assign(p_holm=holm(table["p_value"].to_numpy(dtype=np.float64)))
+    verdicts = [
+        row["verdict"] or _verdict(row, row[difference], significance).value for row in table.to_dict("records")
+    ]
+    return table.assign(verdict=verdicts)
+
+
+def _verdict(row: Mapping[Any, Any], difference: float, significance: float) -> Verdict:
+    if row["pairs"] < 2:
+        return Verdict.NOT_ENOUGH_PAIRS
+    if np.isnan(row["p_value"]):
+        return Verdict.NO_DIFFERENCE if difference == 0 else Verdict.ALL_EQUAL
+    if row["p_holm"] < significance:
+        return Verdict.SIGNIFICANT
+    return Verdict.BEFORE_HOLM_ONLY if row["p_value"] < significance else Verdict.NOT_SIGNIFICANT
+
+
+def holm(p_values: FloatArray) -> FloatArray:
     """Holm's step-down adjusted p-values [N]. NaN means no test: it stays NaN and is not counted.
 
     Source: S. Holm, "A simple sequentially rejective multiple test procedure", Scand. J. Statist. 6 (1979).
@@ -106,7 +118,7 @@ def holm(p_values: Floats) -> Floats:
     return adjusted
 
 
-def mean_interval(values: Floats) -> tuple[float, float]:
+def mean_interval(values: FloatArray) -> tuple[float, float]:
     """Two-sided 95 % t interval of the mean of values [N]; NaN, NaN without a spread."""
     if len(values) < 2 or _all_equal(values, largest=float(np.abs(values).max())):
         return np.nan, np.nan
@@ -123,26 +135,29 @@ def rate_interval(successes: int, games: int) -> tuple[float, float]:
     return float(interval.low), float(interval.high)
 
 
+def mean_cells(name: str, values: FloatArray) -> dict[str, float]:
+    """The mean of values [N] with the ends of its interval, as the cells of three columns; NaN without values."""
+    low, high = mean_interval(values)
+    return {name: float(values.mean()) if len(values) else np.nan, f"{name}_low": low, f"{name}_high": high}
+
+
+def rate_cells(name: str, successes: float, games: int) -> dict[str, float]:
+    """A rate with the ends of its interval, as the cells of three columns; NaN without games."""
+    low, high = rate_interval(int(successes), games)
+    return {name: successes / games if games else np.nan, f"{name}_low": low, f"{name}_high": high}
+
+
 def _row(
-    question: Question, metric: ComparedMetric, games: Mapping[Any, pd.DataFrame], closed: Gate | None
+    question: Question, metric: ComparedMetric, games: Mapping[Any, pd.DataFrame], closed: Gate
 ) -> dict[str, object]:
     baseline, treatment, left_out = pairs_of(
         games, question.seed, question.baseline, question.treatment, [metric.column]
     )
     low, high = (baseline, treatment) if metric.sign[question.question] > 0 else (treatment, baseline)
     low, high = low[:, 0], high[:, 0]
-    row: dict[str, object] = {
-        "question": question.question,
-        "persona": question.persona,
-        "seed": question.seed,
-        "metric": metric.name,
-        "pairs": len(low),
-        "pairs_left_out": left_out,
-        "verdict": closed.verdict.value if closed is not None else "",
-        "reason": closed.reason if closed is not None else "",
-    }
+    row = vars(question) | vars(closed) | {"metric": metric.name, "pairs": len(low), "pairs_left_out": left_out}
     row |= paired_t_test(low, high, closed)
-    if closed is None and metric.name == "failure" and len(low) >= 2:
+    if not closed.reason and metric.name == "failure" and len(low) >= 2:
         row["mcnemar_p"] = _mcnemar(low, high)
     return row
 
@@ -154,36 +169,34 @@ def games_by_arm(episodes: pd.DataFrame) -> Mapping[Any, pd.DataFrame]:
 
 def pairs_of(
     games: Mapping[Any, pd.DataFrame], seed: int, baseline: str, treatment: str, columns: Sequence[str]
-) -> tuple[Floats, Floats, int]:
+) -> tuple[FloatArray, FloatArray, int]:
     """Baseline values [N, C], treatment values [N, C] of the same N episodes, and the number of pairs left out:
     those with a game that errored, is missing, or lacks one of the columns [C].
 
     Raises ValueError when an arm has two games for one episode.
     """
     sides = [measured_values(games.get((arm, seed)), columns) for arm in (baseline, treatment)]
-    for arm, side in zip((baseline, treatment), sides, strict=True):
-        if not side.index.is_unique:
-            raise ValueError(f"arm {arm!r}, seed {seed}: an episode appears more than once")
     both = pd.concat(sides, axis=1).to_numpy(dtype=np.float64)
     measured = np.isfinite(both).all(axis=1)
     return both[measured, : len(columns)], both[measured, len(columns) :], int((~measured).sum())
 
 
 def measured_values(rows: pd.DataFrame | None, columns: Sequence[str]) -> pd.DataFrame:
-    """The columns of an arm's games by episode; NaN where one is empty or the game could not be played."""
+    """The columns of an arm's games by episode; NaN where one is empty or the game could not be played.
+
+    Raises ValueError when the arm has two games for one episode.
+    """
     if rows is None:
         return pd.DataFrame(columns=list(columns), dtype="float64")
-    errored = ((rows["ego_outcome"] == "error") | (rows["error"].fillna("") != "")).to_numpy(dtype=bool)
-    values = {
-        name: pd.to_numeric(rows[name]).astype("Float64").to_numpy(dtype=np.float64, na_value=np.nan)
-        for name in columns
-    }
-    return pd.DataFrame(
-        {name: np.where(errored, np.nan, cells) for name, cells in values.items()}, index=rows["episode"].to_numpy()
-    )
+    values = rows.set_index("episode")
+    if not values.index.is_unique:
+        first = rows.iloc[0]
+        raise ValueError(f"arm {first['arm']!r}, seed {first['seed']}: an episode appears more than once")
+    errored = (values["ego_outcome"] == "error") | (values["error"].fillna("") != "")
+    return values[list(columns)].astype("Float64").astype("float64").mask(errored.astype(bool))
 
 
-def paired_t_test(low: Floats, high: Floats, closed: Gate | None = None) -> dict[str, float]:
+def paired_t_test(low: FloatArray, high: FloatArray, closed: Gate) -> dict[str, float]:
     """H1: the mean of `high - low`, [N] each, is > 0. The result has the table's columns that exist for these pairs.
 
     Behind a closed gate there is no test: only the mean difference, which describes the games.
@@ -193,7 +206,7 @@ def paired_t_test(low: Floats, high: Floats, closed: Gate | None = None) -> dict
         return {}
     largest = float(np.abs([low, high]).max())
     mean = float(differences.mean())
-    if closed is not None or len(differences) < 2 or _all_equal(differences, largest):
+    if closed.reason or len(differences) < 2 or _all_equal(differences, largest):
         return {"mean_difference": 0.0 if abs(mean) <= ROUNDING * largest else mean}
     ci_low, ci_high = mean_interval(differences)
     test = scipy.stats.ttest_rel(high, low, alternative="greater")
@@ -207,26 +220,13 @@ def paired_t_test(low: Floats, high: Floats, closed: Gate | None = None) -> dict
     }
 
 
-def _all_equal(values: Floats, largest: float) -> bool:
+def _all_equal(values: FloatArray, largest: float) -> bool:
     """Whether values [N] are equal up to the rounding of numbers as large as `largest`."""
     return bool(np.ptp(values) <= ROUNDING * largest or values.std(ddof=1) == 0)
 
 
-def _mcnemar(low: Floats, high: Floats) -> float:
+def _mcnemar(low: FloatArray, high: FloatArray) -> float:
     in_favour, against = int((high > low).sum()), int((high < low).sum())
     if in_favour + against == 0:
         return 1.0
     return float(scipy.stats.binomtest(in_favour, in_favour + against, 0.5, alternative="greater").pvalue)
-
-
-def verdict_of(row: Mapping[Any, Any], significance: float) -> Verdict:
-    """The verdict of a row, from its pairs, p-values and mean difference; the one that it has behind a closed gate."""
-    if row["verdict"]:
-        return Verdict(row["verdict"])
-    if row["pairs"] < 2:
-        return Verdict.NOT_ENOUGH_PAIRS
-    if np.isnan(row["p_value"]):
-        return Verdict.NO_DIFFERENCE if row["mean_difference"] == 0 else Verdict.ALL_EQUAL
-    if row["p_holm"] < significance:
-        return Verdict.SIGNIFICANT
-    return Verdict.BEFORE_HOLM_ONLY if row["p_value"] < significance else Verdict.NOT_SIGNIFICANT

@@ -16,55 +16,36 @@ and a game may fail to be played.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
-import numpy as np
 import pandas as pd
 
-from harness.evaluation.comparisons.comparison import rate_interval
+from harness.evaluation.comparisons.comparison import rate_cells
 from harness.evaluation.tables import table_of
 
 ANY = "any"
 """The row of `preventability.csv` on the games that at least one person among the reference drivers prevents."""
 UPPER_BOUND = "upper_bound"
-FROM_CONFLICT, FROM_START = "from_conflict", "from_start"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Prevented:
-    """How many failures of an arm are prevented, in one of the two verdicts."""
-
-    judged: int
-    """Failures on which there is a verdict."""
-    by_any: int
-    """Prevented by at least one reference driver but the upper bound."""
-    by_driver: dict[str, int]
-    by_upper_bound: int
+_VERDICTS = ("from_conflict", "from_start")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Preventability:
     """What the failures of one arm and training seed come to."""
 
-    arm: str
     seed: int
-    episodes: int
-    """Games that were played."""
     failures: int
-    from_conflict: Prevented
-    from_start: Prevented
+    judged: int
+    """Failures on which there is a verdict from the start."""
+    prevented: int
+    """Of these, prevented by at least one reference driver but the upper bound."""
     rate: float
-    """Preventable failure rate: failures that a reference driver prevents from the start, per game."""
+    """Preventable failure rate: `prevented` per game, with its 95 % interval."""
     rate_low: float
     rate_high: float
-    last_chance_s: float | None
-    """Median time before the failure at which full braking still prevents it; None if it is not known."""
-
-    @property
-    def sentences(self) -> list[str]:
-        """The verdicts in words, one sentence each; empty without failures."""
-        return list(_sentences(self)) if self.failures else []
+    sentences: list[str]
+    """The verdicts in words, one sentence each; empty without failures."""
 
 
 def count_prevented(games: pd.DataFrame, episodes: pd.DataFrame) -> pd.DataFrame:
@@ -75,15 +56,28 @@ def count_prevented(games: pd.DataFrame, episodes: pd.DataFrame) -> pd.DataFrame
     """
     rows: list[dict[str, object]] = []
     for (arm, persona, seed), judged in games.groupby(["arm", "persona", "seed"], sort=False):
-        played = _played(episodes, str(arm), int(seed))
+        played = episodes[(episodes["arm"] == arm) & (episodes["seed"] == seed) & (episodes["error"] == "")]
+        played = played[played["ego_failed"].notna()]
         counted = {"arm": arm, "persona": persona, "seed": seed, "episodes": len(played)}
         counted["failures"] = int(played["ego_failed"].sum())
         for name, driver in judged.groupby("driver", sort=False):
             rows.append({**counted, "driver": name, **_verdicts(driver, len(played))})
         persons = judged[judged["driver"] != UPPER_BOUND]
-        columns = [f"prevented_{FROM_CONFLICT}", f"prevented_{FROM_START}"]
+        columns = [f"prevented_{verdict}" for verdict in _VERDICTS]
         rows.append({**counted, "driver": ANY, **_verdicts(persons.groupby("episode")[columns].max(), len(played))})
     return table_of("preventability", rows)
+
+
+def _verdicts(games: pd.DataFrame, episodes: int) -> dict[str, float]:
+    """The columns of both verdicts, from one row per failure."""
+    cells: dict[str, float] = {}
+    for verdict in _VERDICTS:
+        judged = games[f"prevented_{verdict}"].dropna()
+        prevented = int(judged.sum())
+        cells |= {f"{verdict}_judged": len(judged), f"{verdict}_prevented": prevented}
+        cells |= rate_cells(f"{verdict}_share", prevented, len(judged))
+        cells |= rate_cells(f"{verdict}_rate", prevented, episodes)
+    return cells
 
 
 def preventability_of(counts: pd.DataFrame, games: pd.DataFrame, arm: str) -> list[Preventability]:
@@ -91,93 +85,51 @@ def preventability_of(counts: pd.DataFrame, games: pd.DataFrame, arm: str) -> li
     tables `preventability.csv` and `reference_drivers.csv`."""
     found = []
     for seed, rows in counts[counts["arm"] == arm].groupby("seed", sort=False):
-        by_driver = {str(row["driver"]): row for row in rows.to_dict("records")}
-        both = by_driver[ANY]
+        drivers = rows.set_index("driver")
+        both = drivers.loc[ANY]
         of_arm = games[(games["arm"] == arm) & (games["seed"] == seed)]
-        left_s = (of_arm["failed_s"] - of_arm["preventable_until_s"]).dropna()
+        last_chance_s = (of_arm["failed_s"] - of_arm["preventable_until_s"]).median()
         found.append(
             Preventability(
-                arm=arm,
                 seed=int(seed),
-                episodes=int(both["episodes"]),
                 failures=int(both["failures"]),
-                from_conflict=_prevented(by_driver, FROM_CONFLICT),
-                from_start=_prevented(by_driver, FROM_START),
-                rate=float(both[f"{FROM_START}_rate"]),
-                rate_low=float(both[f"{FROM_START}_rate_low"]),
-                rate_high=float(both[f"{FROM_START}_rate_high"]),
-                last_chance_s=float(left_s.median()) if len(left_s) else None,
+                judged=int(both["from_start_judged"]),
+                prevented=int(both["from_start_prevented"]),
+                rate=float(both["from_start_rate"]),
+                rate_low=float(both["from_start_rate_low"]),
+                rate_high=float(both["from_start_rate_high"]),
+                sentences=list(_sentences(drivers, last_chance_s)) if both["failures"] else [],
             )
         )
     return found
 
 
-def _played(episodes: pd.DataFrame, arm: str, seed: int) -> pd.DataFrame:
-    games = episodes[(episodes["arm"] == arm) & (episodes["seed"] == seed)]
-    return games[(games["error"] == "") & games["ego_failed"].notna()]
-
-
-def _verdicts(games: pd.DataFrame, episodes: int) -> dict[str, float]:
-    """The columns of both verdicts, from one row per failure."""
-    cells: dict[str, float] = {}
-    for verdict in (FROM_CONFLICT, FROM_START):
-        judged = games[f"prevented_{verdict}"].dropna()
-        prevented = int(judged.sum())
-        cells |= {f"{verdict}_judged": len(judged), f"{verdict}_prevented": prevented}
-        for name, total in (("share", len(judged)), ("rate", episodes)):
-            low, high = rate_interval(prevented, total)
-            cells[f"{verdict}_{name}"] = prevented / total if total else np.nan
-            cells |= {f"{verdict}_{name}_low": low, f"{verdict}_{name}_high": high}
-    return cells
-
-
-def _prevented(by_driver: dict[str, dict[str, object]], verdict: str) -> Prevented:
-    counts = {name: int(str(row[f"{verdict}_prevented"])) for name, row in by_driver.items()}
-    judged = int(str(by_driver[ANY][f"{verdict}_judged"]))
-    by_any, by_upper_bound = counts.pop(ANY), counts.pop(UPPER_BOUND, 0)
-    return Prevented(judged=judged, by_any=by_any, by_driver=counts, by_upper_bound=by_upper_bound)
-
-
-def _sentences(found: Preventability) -> Iterator[str]:
-    start, conflict = found.from_start, found.from_conflict
-    if start.judged:
-        count, who = _of(start.by_any, start.judged), _by_driver(start.by_driver)
-        yield f"A reference driver in its place from the start prevents {count} failures ({who})."
-        low, high = 100.0 * found.rate_low, 100.0 * found.rate_high
+def _sentences(drivers: pd.DataFrame, last_chance_s: float) -> Iterator[str]:
+    both, persons = drivers.loc[ANY], drivers.drop(index=[ANY, UPPER_BOUND], errors="ignore")
+    if both["from_start_judged"]:
         yield (
-            f"Preventable failure rate: {100.0 * found.rate:.1f} % of {found.episodes} games "
-            f"(95 %: {low:.1f}–{high:.1f} %)."
+            f"A reference driver in its place from the start prevents {_of(both, 'from_start')} failures "
+            f"({_by_driver(persons['from_start_prevented'])})."
         )
-    if conflict.judged:
-        count, who = _of(conflict.by_any, conflict.judged), _by_driver(conflict.by_driver)
-        bound = f"full braking in the first moment of danger {conflict.by_upper_bound}"
-        yield f"Taking over when the danger shows, it prevents {count} collisions ({who}; {bound})."
-    if found.last_chance_s is not None:
-        yield f"Full braking prevents the collision until {found.last_chance_s:.1f} s before it (median)."
+        rate, low, high = (100.0 * both[f"from_start_rate{end}"] for end in ("", "_low", "_high"))
+        yield f"Preventable failure rate: {rate:.1f} % of {both['episodes']} games (95 %: {low:.1f}–{high:.1f} %)."
+    if both["from_conflict_judged"]:
+        bound = drivers["from_conflict_prevented"].get(UPPER_BOUND, 0)
+        yield (
+            f"Taking over when the danger shows, it prevents {_of(both, 'from_conflict')} collisions "
+            f"({_by_driver(persons['from_conflict_prevented'])}; full braking in the first moment of danger {bound})."
+        )
+    if pd.notna(last_chance_s):
+        yield f"Full braking prevents the collision until {last_chance_s:.1f} s before it (median)."
 
 
-def _of(count: int, total: int) -> str:
-    return f"{'none' if count == 0 else count} of {total}"
+def _of(both: pd.Series, verdict: str) -> str:
+    return f"{both[f'{verdict}_prevented'] or 'none'} of {both[f'{verdict}_judged']}"
 
 
-def _by_driver(counts: dict[str, int]) -> str:
-    return ", ".join(f"{in_words(name)} {count}" for name, count in counts.items())
+def _by_driver(prevented: pd.Series) -> str:
+    return ", ".join(f"{_WORDS.get(str(name), name)} {count}" for name, count in prevented.items())
 
 
-_WORDS = {
-    "careful_and_competent": "careful and competent",
-    "fuzzy": "fuzzy safety model",
-    "rss": "RSS",
-    UPPER_BOUND: "upper bound",
-    ANY: "any of them",
-}
-
-
-def in_words(driver: str) -> str:
-    """A reference driver's name in prose."""
-    return _WORDS.get(driver, driver.replace("_", " "))
-
-
-def driver_names(counts: pd.DataFrame) -> Sequence[str]:
-    """The reference drivers of a table, in its order, without `ANY`."""
-    return [str(name) for name in dict.fromkeys(counts["driver"]) if name != ANY]
+_WORDS = {"careful_and_competent": "careful and competent", "fuzzy": "fuzzy safety model", "rss": "RSS"}
+"""Reference drivers in prose."""

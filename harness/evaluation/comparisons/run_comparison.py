@@ -11,22 +11,21 @@ games are compared in pairs; on different scenes there are no pairs, and only th
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 from scipy import stats
 
 from harness.evaluation.comparisons.comparison import (
-    Floats,
     games_by_arm,
     holm,
+    mean_cells,
     mean_interval,
     measured_values,
-    rate_interval,
+    rate_cells,
 )
+from harness.game.arrays import FloatArray
 
 MEASURES = {"failures": "ego_failed", "near misses": "near_miss", "average speed": "ego_mean_speed_mps"}
 """What is compared, and its column in episodes.csv."""
@@ -77,43 +76,48 @@ def differences_of(before: pd.DataFrame, after: pd.DataFrame, same_scene: bool) 
     """
     then, now = games_by_arm(before), games_by_arm(after)
     found = [
-        _difference(measure, arm, seed, then[arm, seed], now[arm, seed], same_scene)
-        for arm, seed in then
-        if (arm, seed) in now
+        _difference(measure, column, (then[place], now[place]), same_scene)
+        for place in then
+        if place in now
         for measure, column in MEASURES.items()
-        if all(column in rows and rows[column].notna().any() for rows in (then[arm, seed], now[arm, seed]))
+        if all(column in rows and rows[column].notna().any() for rows in (then[place], now[place]))
     ]
-    corrected = holm(np.array([each["p_value"] for each in found], dtype=np.float64))
-    return [Difference(**each, p_holm=float(p)) for each, p in zip(found, corrected, strict=True)]
+    corrected = holm(np.array([each.p_value for each in found]))
+    return [replace(each, p_holm=float(p)) for each, p in zip(found, corrected, strict=True)]
 
 
-def _difference(
-    measure: str, arm: str, seed: int, before: pd.DataFrame, after: pd.DataFrame, paired: bool
-) -> dict[str, Any]:
-    sides = [measured_values(rows, [MEASURES[measure]]) for rows in (before, after)]
-    if not all(side.index.is_unique for side in sides):
-        raise ValueError(f"arm {arm!r}, seed {seed}: an episode appears more than once")
-    values = [side.iloc[:, 0].dropna().to_numpy(dtype=np.float64) for side in sides]
-    described = {"measure": measure, "arm": arm, "seed": seed}
-    described |= {name: _side(measure, each) for name, each in zip(("before", "after"), values, strict=True)}
-    pairs = pd.concat(sides, axis=1).dropna().to_numpy(dtype=np.float64) if paired else np.zeros((0, 2))
-    return described | {"pairs": len(pairs)} | dict(_test(measure, pairs))
-
-
-def _side(measure: str, values: Floats) -> Side:
-    is_rate = measure in RATES
-    low, high = rate_interval(int(values.sum()), len(values)) if is_rate else mean_interval(values)
-    return Side(value=float(values.mean()) if len(values) else np.nan, low=low, high=high, games=len(values))
-
-
-def _test(measure: str, pairs: Floats) -> Mapping[str, float]:
-    if not len(pairs):
-        return dict.fromkeys(("mean", "low", "high", "p_value"), np.nan)
+def _difference(measure: str, column: str, runs: tuple[pd.DataFrame, pd.DataFrame], paired: bool) -> Difference:
+    """A measure in two runs' games of one arm and seed; its `p_holm` is not corrected yet."""
+    sides = [measured_values(rows, [column])[column] for rows in runs]
+    before, after = (_side(measure, side.dropna().to_numpy()) for side in sides)
+    pairs = pd.concat(sides, axis=1).dropna().to_numpy() if paired else np.zeros((0, 2))
     differences = pairs[:, 1] - pairs[:, 0]
     low, high = mean_interval(differences)
-    if measure in RATES:
+    p_value = _p_value(measure, differences)
+    return Difference(
+        measure=measure,
+        arm=str(runs[0]["arm"].iloc[0]),
+        seed=int(runs[0]["seed"].iloc[0]),
+        before=before,
+        after=after,
+        pairs=len(pairs),
+        mean=float(differences.mean()) if len(pairs) else np.nan,
+        low=low,
+        high=high,
+        p_value=p_value,
+        p_holm=p_value,
+    )
+
+
+def _side(measure: str, values: FloatArray) -> Side:
+    cells = rate_cells("value", values.sum(), len(values)) if measure in RATES else mean_cells("value", values)
+    return Side(value=cells["value"], low=cells["value_low"], high=cells["value_high"], games=len(values))
+
+
+def _p_value(measure: str, differences: FloatArray) -> float:
+    """Of the differences of pairs; NaN without a test."""
+    if measure in RATES and len(differences):
         more, fewer = int((differences > 0).sum()), int((differences < 0).sum())
-        p = float(stats.binomtest(more, more + fewer, 0.5).pvalue) if more + fewer else 1.0
-    else:
-        p = float(stats.ttest_1samp(differences, 0.0).pvalue) if np.isfinite(low) else np.nan
-    return {"mean": float(differences.mean()), "low": low, "high": high, "p_value": p}
+        return float(stats.binomtest(more, more + fewer, 0.5).pvalue) if more + fewer else 1.0
+    has_spread = np.isfinite(mean_interval(differences)[0])
+    return float(stats.ttest_1samp(differences, 0.0).pvalue) if has_spread else np.nan

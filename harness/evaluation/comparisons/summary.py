@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from harness.evaluation.columns import MEANS
-from harness.evaluation.comparisons.comparison import mean_interval, rate_interval
+from harness.evaluation.comparisons.comparison import mean_interval, rate_cells
 from harness.evaluation.people import of_people
 from harness.evaluation.tables import table_of, typed
 
@@ -34,44 +34,30 @@ def _summary_row(arm: str, persona: str, seed: int, games: pd.DataFrame) -> dict
     played = games[(games["ego_outcome"] != "error") & (games["error"] == "")]
     with_ego = played[played["ego_failed"].notna()]
     outcomes = of_people(played, "outcome")
-    people = outcomes.to_numpy()[(outcomes != "").to_numpy()]
+    took_part = (outcomes != "").to_numpy()
+    people = outcomes.to_numpy()[took_part]
     near_misses = played["near_miss"].dropna()
-    speeds = played["ego_mean_speed_mps"].dropna()
-    speed_low, speed_high = mean_interval(speeds.to_numpy())
-
-    def count_of(outcome: str) -> int | None:
-        return int((with_ego["ego_outcome"] == outcome).sum()) if len(with_ego) else None
-
+    speed_low, speed_high = mean_interval(played["ego_mean_speed_mps"].dropna().to_numpy())
+    goal_rate = rate_cells("non_ego_goal_rate", (people == "goal").sum(), len(people))
+    if len(people) > took_part.any(axis=1).sum():  # several people in a game
+        goal_rate |= {"non_ego_goal_rate_low": np.nan, "non_ego_goal_rate_high": np.nan}
+    ends = {"collision": "collisions", "rail": "rails", "timeout": "timeouts"}
     return {
         "arm": arm,
         "persona": persona,
         "seed": seed,
         "episodes": len(games),
         "errors": len(games) - len(played),
-        **_rate("failure_rate", int(with_ego["ego_failed"].sum()), len(with_ego)),
-        "collisions": count_of("collision"),
-        "rails": count_of("rail"),
-        "timeouts": count_of("timeout"),
+        **rate_cells("failure_rate", with_ego["ego_failed"].sum(), len(with_ego)),
+        **{name: (with_ego["ego_outcome"] == end).sum() if len(with_ego) else None for end, name in ends.items()},
         "mean_speed_low_mps": speed_low,
         "mean_speed_high_mps": speed_high,
         **{metric.mean: played[f"ego_{name}"].mean() for name, metric in MEANS.items() if "ego" in metric.whose},
-        **_goal_rate(int((people == "goal").sum()), len(people), games=int((outcomes != "").any(axis=1).sum())),
+        **goal_rate,
         **{f"non_ego_{name}": _mean(of_people(played, name)) for name in MEANS if "person" in MEANS[name].whose},
-        **_rate("near_miss_rate", int(near_misses.sum()), len(near_misses)),
+        **rate_cells("near_miss_rate", near_misses.sum(), len(near_misses)),
     }
 
 
 def _mean(cells: pd.DataFrame) -> float:
     return float(pd.Series(cells.to_numpy(dtype=np.float64).ravel()).mean())
-
-
-def _goal_rate(goals: int, people: int, games: int) -> dict[str, float]:
-    """The share of the people of all games that reached their goals; its interval, if each game had one person."""
-    rate = _rate("non_ego_goal_rate", goals, people)
-    return rate if people == games else dict.fromkeys(rate, np.nan) | {"non_ego_goal_rate": rate["non_ego_goal_rate"]}
-
-
-def _rate(column: str, successes: int, games: int) -> dict[str, float]:
-    """The rate and its Clopper-Pearson interval, as three columns; empty without games."""
-    low, high = rate_interval(successes, games)
-    return {column: successes / games if games else np.nan, f"{column}_low": low, f"{column}_high": high}

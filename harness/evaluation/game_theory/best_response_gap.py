@@ -12,24 +12,19 @@ from enum import Enum
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 
 from harness.evaluation.comparisons.comparison import (
     games_by_arm,
     holm,
-    mean_interval,
+    mean_cells,
     paired_t_test,
     pairs_of,
-    rate_interval,
+    rate_cells,
 )
 from harness.evaluation.competence import gate
 from harness.evaluation.game_theory.records import Response
 from harness.evaluation.tables import table_of, typed
-
-Floats = npt.NDArray[np.float64]
-
-PAYOFF = {"ego": "ego_payoff", "non_ego": "non_ego_payoff"}
 
 
 class GapVerdict(str, Enum):
@@ -64,10 +59,8 @@ def gaps(responses: Iterable[Response], episodes: pd.DataFrame, significance: fl
     there is no test, as in `comparisons.comparison`. Holm's correction is over all gaps of this table.
     There is no test either where a player of the pair misses a bound of `Response.alone`.
 
-    Raises ValueError when significance is not in (0, 1), or when an arm has two games for one episode.
+    Raises ValueError when an arm has two games for one episode.
     """
-    if not 0 < significance < 1:
-        raise ValueError(f"significance must be between 0 and 1, not {significance}")
     games = games_by_arm(episodes)
     table = table_of("gaps", [_row(response, games) for response in responses])
     table["p_holm"] = holm(table["p_value"].to_numpy(dtype=np.float64))
@@ -86,35 +79,20 @@ def nothing_to_gain(found: pd.DataFrame) -> bool:
 
 
 def _row(response: Response, games: Mapping[Any, pd.DataFrame]) -> dict[str, object]:
-    columns = [PAYOFF[response.role], "ego_failed"]
+    columns = [f"{response.role}_payoff", "ego_failed"]
     pair, best, left_out = pairs_of(games, response.seed, response.pair_arm, response.response_arm, columns)
     closed = gate(response.alone, response.seed, games)
-    row: dict[str, object] = {
-        "reason": closed.reason if closed is not None else "",
-        "seed": response.seed,
-        "persona": response.persona,
-        "round": response.round,
-        "role": response.role,
-        "ego": response.ego,
-        "non_ego": response.non_ego,
-        "pairs": len(pair),
-        "pairs_left_out": left_out,
-    }
+    row = vars(response) | vars(closed) | {"pairs": len(pair), "pairs_left_out": left_out}
     if not len(pair):
         return row
     payoff = float(pair[:, 0].mean())
     test = paired_t_test(pair[:, 0], best[:, 0], closed)
-    row |= {"payoff": payoff, "payoff_best_response": float(best[:, 0].mean()), "gap": test["mean_difference"]}
-    row |= {name: test[name] for name in ("ci_low", "ci_high", "p_value") if name in test}
+    row |= test | {"payoff": payoff, "payoff_best_response": best[:, 0].mean(), "gap": test["mean_difference"]}
     if payoff != 0:
         row["gap_share"] = test["mean_difference"] / abs(payoff)
-    for name, failed in (("ego_failure_rate", pair[:, 1]), ("ego_failure_rate_best_response", best[:, 1])):
-        low, high = rate_interval(int(failed.sum()), len(failed))
-        row |= {name: float(failed.mean()), f"{name}_low": low, f"{name}_high": high}
-    differences = best[:, 1] - pair[:, 1]
-    low, high = mean_interval(differences)
-    row |= {"failure_difference": float(differences.mean())}
-    return row | {"failure_difference_low": low, "failure_difference_high": high}
+    row |= rate_cells("ego_failure_rate", pair[:, 1].sum(), len(pair))
+    row |= rate_cells("ego_failure_rate_best_response", best[:, 1].sum(), len(best))
+    return row | mean_cells("failure_difference", best[:, 1] - pair[:, 1])
 
 
 def _verdict(row: Mapping[Any, Any], significance: float) -> GapVerdict:

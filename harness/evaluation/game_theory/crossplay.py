@@ -6,14 +6,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 
-from harness.evaluation.comparisons.comparison import games_by_arm, mean_interval, measured_values, rate_interval
+from harness.evaluation.comparisons.comparison import games_by_arm, mean_cells, measured_values, rate_cells
 from harness.evaluation.game_theory.records import Pairing
 from harness.evaluation.tables import table_of
-
-Floats = npt.NDArray[np.float64]
+from harness.game.arrays import FloatArray
 
 MEASURED = ("ego_failed", "ego_payoff", "non_ego_payoff", "ego_mean_speed_mps")
 
@@ -27,43 +25,25 @@ def crossplay(pairings: Iterable[Pairing], episodes: pd.DataFrame) -> pd.DataFra
 
     Raises ValueError when an ego and a non-ego are paired twice, or an arm has two games for one episode.
     """
-    pairings, games = list(pairings), games_by_arm(episodes)
-    cells = [(pairing.seed, pairing.ego, pairing.non_ego) for pairing in pairings]
-    for cell in {cell for cell in cells if cells.count(cell) > 1}:
-        raise ValueError(f"seed {cell[0]}: {cell[1]!r} against {cell[2]!r} are paired twice")
-    played: dict[int, set[int]] = {}
-    values = {}
+    games, played = games_by_arm(episodes), dict[int, set[int]]()
+    values = dict[tuple[int, str, str], tuple[Pairing, pd.DataFrame]]()
     for pairing in pairings:
-        values[pairing] = measured_values(games.get((pairing.arm, pairing.seed)), MEASURED)
-        if not values[pairing].index.is_unique:
-            raise ValueError(f"arm {pairing.arm!r}, seed {pairing.seed}: an episode appears more than once")
-        played.setdefault(pairing.seed, set()).update(values[pairing].index)
-    rows = [_row(pairing, values[pairing], len(played[pairing.seed])) for pairing in pairings]
+        cell = (pairing.seed, pairing.ego, pairing.non_ego)
+        if cell in values:
+            raise ValueError(f"seed {pairing.seed}: {pairing.ego!r} against {pairing.non_ego!r} are paired twice")
+        values[cell] = (pairing, measured_values(games.get((pairing.arm, pairing.seed)), MEASURED))
+        played.setdefault(pairing.seed, set()).update(values[cell][1].index)
+    rows = [_row(pairing, measured, len(played[pairing.seed])) for pairing, measured in values.values()]
     return table_of("crossplay", rows)
 
 
 def _row(pairing: Pairing, values: pd.DataFrame, episodes: int) -> dict[str, object]:
-    known = values[np.isfinite(values["ego_failed"])]
-    failures, count = known["ego_failed"].sum(), len(known)
-    low, high = rate_interval(int(failures), count)
-    row: dict[str, object] = {
-        "seed": pairing.seed,
-        "ego": pairing.ego,
-        "non_ego": pairing.non_ego,
-        "persona": pairing.persona,
-        "arm": pairing.arm,
-        "games": count,
-        "left_out": episodes - count,
-        "failure_rate": failures / count if count else np.nan,
-        "failure_rate_low": low,
-        "failure_rate_high": high,
-        "ego_mean_speed_mps": known["ego_mean_speed_mps"].mean(),
-    }
+    known = values.dropna(subset="ego_failed")
+    row = vars(pairing) | {"games": len(known), "left_out": episodes - len(known)}
+    row |= rate_cells("failure_rate", known["ego_failed"].sum(), len(known))
     for name in ("ego_payoff", "non_ego_payoff"):
-        measured = known[name].dropna().to_numpy(dtype=np.float64)
-        low, high = mean_interval(measured)
-        row |= {name: measured.mean() if len(measured) else np.nan, f"{name}_low": low, f"{name}_high": high}
-    return row
+        row |= mean_cells(name, known[name].dropna().to_numpy())
+    return row | {"ego_mean_speed_mps": known["ego_mean_speed_mps"].mean()}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,9 +54,9 @@ class Matrices:
     non_egos: Sequence[str]
     personas: Sequence[str]
     """The personas of the non-egos [N]."""
-    failure_rates: Floats
-    ego_payoffs: Floats
-    non_ego_payoffs: Floats
+    failure_rates: FloatArray
+    ego_payoffs: FloatArray
+    non_ego_payoffs: FloatArray
 
     def among(self, egos: Sequence[int], non_egos: Sequence[int]) -> Matrices:
         """The rows and columns at these places."""
@@ -96,7 +76,7 @@ def matrices(found: pd.DataFrame) -> Matrices:
     egos, non_egos = list(dict.fromkeys(found["ego"])), list(dict.fromkeys(found["non_ego"]))
     persona = dict(zip(found["non_ego"], found["persona"], strict=True))
 
-    def matrix(column: str) -> Floats:
+    def matrix(column: str) -> FloatArray:
         cells = found.pivot(index="ego", columns="non_ego", values=column)
         return cells.reindex(index=egos, columns=non_egos).to_numpy(dtype=np.float64)
 

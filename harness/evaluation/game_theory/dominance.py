@@ -8,16 +8,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 import scipy  # loads its parts at their first use: a worker that solves nothing does without
 
-Floats = npt.NDArray[np.float64]
+from harness.evaluation.game_theory.nash import scaled
+from harness.game.arrays import FloatArray
 
 MARGIN = 1e-9
 """A smaller difference counts as none: the accuracy of the linear programs, on payoffs scaled to a range of 1."""
 
 
-def dominated(payoffs: Floats, names: Sequence[str]) -> list[str]:
+def dominated(payoffs: FloatArray, names: Sequence[str]) -> list[str]:
     """For each strategy, a row of payoffs [E, N], the one that strictly dominates it: that is better in every column.
 
     "" for none; the name of the first pure strategy that dominates it; else the mixture with the widest margin, e.g.
@@ -28,12 +28,10 @@ def dominated(payoffs: Floats, names: Sequence[str]) -> list[str]:
     """
     if payoffs.ndim != 2 or not payoffs.size or not np.isfinite(payoffs).all():
         raise ValueError("dominance needs a complete table of finite numbers")
-    spread = np.ptp(payoffs)
-    scaled = (payoffs - payoffs.min()) / spread if spread > 0 else np.zeros_like(payoffs)
-    return [_dominator(scaled, strategy, names) for strategy in range(len(payoffs))]
+    return [_dominator(scaled(payoffs), strategy, names) for strategy in range(len(payoffs))]
 
 
-def _dominator(payoffs: Floats, strategy: int, names: Sequence[str]) -> str:
+def _dominator(payoffs: FloatArray, strategy: int, names: Sequence[str]) -> str:
     better = np.flatnonzero((payoffs > payoffs[strategy] + MARGIN).all(axis=1))
     if len(better):
         return names[better[0]]
@@ -54,7 +52,7 @@ def _dominator(payoffs: Floats, strategy: int, names: Sequence[str]) -> str:
     return " + ".join(f"{share:.2f} {name}" for share, name in zip(shares, names, strict=True) if share >= 0.005)
 
 
-def safest_mixture(failure_rates: Floats) -> Floats:
+def safest_mixture(failure_rates: FloatArray) -> FloatArray:
     """The shares [E] of egos with the least failure rate against the worst non-ego for them, of rates [E, N]. Of equal
     ones, those with the least mean over the non-egos.
 
@@ -88,7 +86,7 @@ def safest_mixture(failure_rates: Floats) -> Floats:
     return _distribution((mean if mean.status == 0 else least).x[:E])
 
 
-def _distribution(shares: Floats) -> Floats:
+def _distribution(shares: FloatArray) -> FloatArray:
     """Shares without the rounding errors of a linear program: none below 0, their sum 1."""
     clean = np.where(shares < MARGIN, 0.0, shares)
     return np.asarray(clean / clean.sum(), dtype=np.float64)

@@ -9,20 +9,18 @@ and the safest mixture of egos, which uses failure rates only.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from enum import Enum
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 
 from harness.evaluation.game_theory.crossplay import Matrices, matrices
 from harness.evaluation.game_theory.dominance import dominated, safest_mixture
 from harness.evaluation.game_theory.nash import Equilibrium, regrets, solve
 from harness.evaluation.tables import table_of
-
-Floats = npt.NDArray[np.float64]
+from harness.game.arrays import BoolArray
 
 ALL = "all"
 """The game of every non-ego."""
@@ -56,7 +54,7 @@ def equilibria(crossplay: pd.DataFrame) -> pd.DataFrame:
     return table_of("equilibria", rows)
 
 
-def _complete(table: Matrices, measured: npt.NDArray[np.bool_]) -> tuple[Matrices, list[dict[str, object]]]:
+def _complete(table: Matrices, measured: BoolArray) -> tuple[Matrices, list[dict[str, object]]]:
     """The part of a game whose cells [E, N] are all measured, and rows for the strategies left out."""
     has_cells = [bool(column.any()) for column in measured.T]
     egos = [place for place, row in enumerate(measured) if any(has_cells) and row[has_cells].all()]
@@ -71,72 +69,59 @@ def _nash(table: Matrices) -> Iterator[dict[str, Any]]:
     measured = [np.isfinite(each) for each in (table.failure_rates, table.ego_payoffs, table.non_ego_payoffs)]
     game, left_out = _complete(table, np.logical_and.reduce(measured))
     if game.egos:
-        found, strategies = solve(game.ego_payoffs, game.non_ego_payoffs).equilibria, _strategies(game)
+        strategies = _strategies(game)
+        found = solve(game.ego_payoffs, game.non_ego_payoffs)
         for number, each in enumerate(found, 1):
-            for row in _equilibrium(game, each, strategies):
-                yield {"solution": SolutionKind.NASH.value, "number": number, **row}
+            for strategy, cells in zip(strategies, _played(game, each), strict=True):
+                yield strategy | cells | {"solution": SolutionKind.NASH.value, "number": number}
         if not found:
-            for row in strategies:
-                yield {"solution": SolutionKind.NOT_VERIFIED.value, **row}
+            yield from (strategy | {"solution": SolutionKind.NOT_VERIFIED.value} for strategy in strategies)
     yield from left_out
 
 
 def _strategies(game: Matrices) -> list[dict[str, object]]:
     """A row for each ego and non-ego of a game of two players, with the cells that are the same in every solution."""
-    egos = zip(
-        game.egos, dominated(game.ego_payoffs, game.egos), dominated(-game.failure_rates, game.egos), strict=True
-    )
     non_egos = zip(game.non_egos, dominated(game.non_ego_payoffs.T, game.non_egos), strict=True)
-    rows: list[dict[str, object]] = [
+    rows = _egos(game)
+    rows += [{"role": "non_ego", "player": name, "dominated_in_payoff": payoff} for name, payoff in non_egos]
+    return rows
+
+
+def _egos(game: Matrices) -> list[dict[str, object]]:
+    in_payoff, in_failures = (dominated(each, game.egos) for each in (game.ego_payoffs, -game.failure_rates))
+    return [
         {"role": "ego", "player": name, "dominated_in_payoff": payoff, "dominated_in_failures": failures}
-        for name, payoff, failures in egos
+        for name, payoff, failures in zip(game.egos, in_payoff, in_failures, strict=True)
     ]
-    return rows + [{"role": "non_ego", "player": name, "dominated_in_payoff": payoff} for name, payoff in non_egos]
 
 
-def _equilibrium(
-    game: Matrices, at: Equilibrium, strategies: Sequence[dict[str, object]]
-) -> Iterator[dict[str, object]]:
+def _played(game: Matrices, at: Equilibrium) -> Iterator[dict[str, float]]:
+    """The cells of each ego, then of each non-ego, in an equilibrium."""
     x, y = at.ego_shares, at.non_ego_shares
     ego_regret, non_ego_regret = regrets(game.ego_payoffs, game.non_ego_payoffs, at)
-    against = {
-        "ego": (x, game.ego_payoffs @ y, game.failure_rates @ y, ego_regret),
-        "non_ego": (y, x @ game.non_ego_payoffs, x @ game.failure_rates, non_ego_regret),
-    }
-    failure_rate = float(x @ game.failure_rates @ y)
-    places = {"ego": 0, "non_ego": 0}
-    for row in strategies:
-        role = str(row["role"])
-        shares, payoffs, failures, regret = against[role]
-        place = places[role]
-        places[role] += 1
-        yield row | {
-            "share": shares[place],
-            "payoff": payoffs[place],
-            "solution_payoff": float(shares @ payoffs),
-            "regret": regret,
-            "failure_rate": failures[place],
-            "solution_failure_rate": failure_rate,
-        }
+    for shares, payoffs, failures, regret in (
+        (x, game.ego_payoffs @ y, game.failure_rates @ y, ego_regret),
+        (y, x @ game.non_ego_payoffs, x @ game.failure_rates, non_ego_regret),
+    ):
+        for share, payoff, failure_rate in zip(shares, payoffs, failures, strict=True):
+            yield {
+                "share": share,
+                "payoff": payoff,
+                "solution_payoff": float(shares @ payoffs),
+                "regret": regret,
+                "failure_rate": failure_rate,
+                "solution_failure_rate": float(x @ game.failure_rates @ y),
+            }
 
 
 def _safest(table: Matrices) -> Iterator[dict[str, object]]:
-    measured = np.isfinite(table.failure_rates) & np.isfinite(table.ego_payoffs)
-    game, left_out = _complete(table, measured)
+    game, left_out = _complete(table, np.isfinite(table.failure_rates) & np.isfinite(table.ego_payoffs))
     if game.egos:
         shares = safest_mixture(game.failure_rates)
         against = shares @ game.failure_rates
         kind = {"solution": SolutionKind.SAFEST.value, "solution_failure_rate": float(against.max())}
-        in_payoff, in_failures = (dominated(each, game.egos) for each in (game.ego_payoffs, -game.failure_rates))
-        for place, name in enumerate(game.egos):
-            yield kind | {
-                "role": "ego",
-                "player": name,
-                "share": shares[place],
-                "failure_rate": game.failure_rates[place].max(),
-                "dominated_in_payoff": in_payoff[place],
-                "dominated_in_failures": in_failures[place],
-            }
-        for place, name in enumerate(game.non_egos):
-            yield kind | {"role": "non_ego", "player": name, "failure_rate": against[place]}
+        for row, share, rates in zip(_egos(game), shares, game.failure_rates, strict=True):
+            yield kind | row | {"share": share, "failure_rate": rates.max()}
+        for name, rate in zip(game.non_egos, against, strict=True):
+            yield kind | {"role": "non_ego", "player": name, "failure_rate": rate}
     yield from left_out

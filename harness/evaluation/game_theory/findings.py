@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 
 import pandas as pd
 
@@ -12,7 +13,24 @@ from harness.evaluation.game_theory.best_response_gap import gaps
 from harness.evaluation.game_theory.crossplay import crossplay
 from harness.evaluation.game_theory.empirical_game import equilibria
 from harness.evaluation.game_theory.generalisation import generalisation
-from harness.evaluation.game_theory.records import GameFindings, Pairing, Response
+from harness.evaluation.game_theory.records import Pairing, Response
+
+
+@dataclass(frozen=True, kw_only=True)
+class GameFindings:
+    """The four tables of findings, each a table of `columns.TABLES`; empty where the campaign does not ask for it."""
+
+    gaps: pd.DataFrame
+    crossplay: pd.DataFrame
+    equilibria: pd.DataFrame
+    generalisation: pd.DataFrame
+    cautions: Sequence[tuple[int, str]] = ()
+    """Seed and reason: the strategies of the cross-play that were not shown to drive the scene alone."""
+
+    @property
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """The tables by their names in the run folder."""
+        return {name: table for name, table in vars(self).items() if name != "cautions"}
 
 
 def find(
@@ -29,19 +47,14 @@ def find(
     """
     if not pairings and not responses:
         return None
+    games = games_by_arm(episodes)
+    bounds = dict.fromkeys((each.seed, bound) for each in pairings for bound in each.alone)
+    reasons = [(seed, gate([bound], seed, games).reason) for seed, bound in bounds]
     cells = crossplay(pairings, episodes)
     return GameFindings(
         gaps=gaps(responses, episodes, significance),
         crossplay=cells,
         equilibria=equilibria(cells),
         generalisation=generalisation(trained_against, pairings, episodes, significance),
-        cautions=_cautions(pairings, episodes),
+        cautions=[(seed, reason) for seed, reason in reasons if reason],
     )
-
-
-def _cautions(pairings: Sequence[Pairing], episodes: pd.DataFrame) -> list[tuple[int, str]]:
-    """Seed and reason of each strategy of the cross-play that misses its bound alone."""
-    games = games_by_arm(episodes)
-    bounds = dict.fromkeys((each.seed, bound) for each in pairings for bound in each.alone)
-    closed = [(seed, gate([bound], seed, games)) for seed, bound in bounds]
-    return [(seed, each.reason) for seed, each in closed if each is not None]

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from harness.evaluation.comparisons.comparison import (
     games_by_arm,
-    holm,
     paired_t_test,
     pairs_of,
-    rate_interval,
-    verdict_of,
+    rate_cells,
+    with_verdicts,
 )
 from harness.evaluation.competence import gate
 from harness.evaluation.game_theory.records import Pairing
@@ -36,10 +34,8 @@ def generalisation(
     `episodes` has the columns of episodes.csv. Pairs and tests are those of `comparisons.comparison`; there is no test
     where a player, or the naive ego, misses a bound of `Pairing.alone`.
 
-    Raises ValueError when significance is not in (0, 1), or an arm has two games for one episode.
+    Raises ValueError when an arm has two games for one episode.
     """
-    if not 0 < significance < 1:
-        raise ValueError(f"significance must be between 0 and 1, not {significance}")
     pairings, games = list(pairings), games_by_arm(episodes)
     naive = {(each.seed, each.non_ego): each for each in pairings if each.ego == NAIVE}
     rows = [
@@ -47,11 +43,7 @@ def generalisation(
         for pairing in pairings
         if pairing.ego in trained_against and pairing.persona and pairing.persona not in trained_against[pairing.ego]
     ]
-    table = table_of("generalisation", rows)
-    table["p_holm"] = holm(table["p_value"].to_numpy(dtype=np.float64))
-    judged = table.rename(columns={"fewer_failures": "mean_difference"}).to_dict("records")
-    table["verdict"] = [verdict_of(row, significance).value for row in judged]
-    return typed(table)
+    return typed(with_verdicts(table_of("generalisation", rows), significance, difference="fewer_failures"))
 
 
 def _row(
@@ -61,25 +53,13 @@ def _row(
     closed = gate((*bounds, *pairing.alone), pairing.seed, games)
     naive, ego, left_out = pairs_of(games, pairing.seed, arm, pairing.arm, ["ego_failed"])
     was, now = naive[:, 0], ego[:, 0]
-    row: dict[str, object] = {
-        "seed": pairing.seed,
-        "ego": pairing.ego,
-        "met": " + ".join(trained_against),
-        "persona": pairing.persona,
-        "non_ego": pairing.non_ego,
-        "pairs": len(now),
-        "pairs_left_out": left_out,
-        "verdict": closed.verdict.value if closed is not None else "",
-        "reason": closed.reason if closed is not None else "",
-    }
+    row = vars(pairing) | vars(closed) | {"met": " + ".join(trained_against), "pairs": len(now)}
+    row |= {"pairs_left_out": left_out}
     if not len(now):
         return row
-    low, high = rate_interval(int(now.sum()), len(now))
-    row |= {"failure_rate": now.mean(), "failure_rate_low": low, "failure_rate_high": high}
-    row |= {"naive_failure_rate": was.mean()}
+    row |= rate_cells("failure_rate", now.sum(), len(now)) | {"naive_failure_rate": was.mean()}
     if was.sum():
         row["share_of_naive"] = now.sum() / was.sum()
     test = paired_t_test(now, was, closed)
-    names = {"mean_difference": "", "ci_low": "_low", "ci_high": "_high"}
-    row |= {f"fewer_failures{end}": test[name] for name, end in names.items() if name in test}
-    return row | ({"p_value": test["p_value"]} if "p_value" in test else {})
+    names = {"mean_difference": "fewer_failures", "ci_low": "fewer_failures_low", "ci_high": "fewer_failures_high"}
+    return row | {names.get(name, name): cell for name, cell in test.items()}

@@ -21,12 +21,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import scipy  # loads its parts at their first use: a worker that solves nothing does without
 
 from harness.errors import HarnessError
-
-Floats = npt.NDArray[np.float64]
+from harness.game.arrays import BoolArray, FloatArray
 
 TOLERANCE = 1e-7
 """The largest regret of an equilibrium, as a share of the range of its player's payoffs (max - min of the matrix).
@@ -57,21 +55,11 @@ class NoEquilibrium(HarnessError):
 class Equilibrium:
     """Shares of the ego's strategies [E] and of the non-ego's strategies [N]; each sums to 1."""
 
-    ego_shares: Floats
-    non_ego_shares: Floats
+    ego_shares: FloatArray
+    non_ego_shares: FloatArray
 
 
-@dataclass(frozen=True, kw_only=True)
-class Solution:
-    """The equilibria of a game, the one to choose first (see `equilibrium_shares`)."""
-
-    equilibria: tuple[Equilibrium, ...]
-    """Empty when none verified. Of a continuum of equilibria (a degenerate game) it contains some corners."""
-    all_supports: bool
-    """Whether all supports were enumerated. Otherwise there may be more equilibria."""
-
-
-def equilibrium_shares(ego_payoffs: Floats, non_ego_payoffs: Floats) -> tuple[Floats, Floats]:
+def equilibrium_shares(ego_payoffs: FloatArray, non_ego_payoffs: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The shares [E] and [N] of one verified equilibrium of the game [E, N], always the same one.
 
     It is the equilibrium with the highest ego payoff. Among equal payoffs it is the first one when the ego's shares,
@@ -79,13 +67,13 @@ def equilibrium_shares(ego_payoffs: Floats, non_ego_payoffs: Floats) -> tuple[Fl
 
     Raises NoEquilibrium when none verifies, ValueError when the matrices are not a game.
     """
-    equilibria = solve(ego_payoffs, non_ego_payoffs).equilibria
+    equilibria = solve(ego_payoffs, non_ego_payoffs)
     if not equilibria:
         raise NoEquilibrium("no candidate equilibrium could be verified")
     return equilibria[0].ego_shares, equilibria[0].non_ego_shares
 
 
-def regrets(ego_payoffs: Floats, non_ego_payoffs: Floats, at: Equilibrium) -> tuple[float, float]:
+def regrets(ego_payoffs: FloatArray, non_ego_payoffs: FloatArray, at: Equilibrium) -> tuple[float, float]:
     """The gain of ego and non-ego by their best pure strategies, each in its own payoff; never below 0."""
     against_non_ego, against_ego = ego_payoffs @ at.non_ego_shares, at.ego_shares @ non_ego_payoffs
     ego = against_non_ego.max() - at.ego_shares @ against_non_ego
@@ -93,8 +81,11 @@ def regrets(ego_payoffs: Floats, non_ego_payoffs: Floats, at: Equilibrium) -> tu
     return max(float(ego), 0.0), max(float(non_ego), 0.0)
 
 
-def solve(ego_payoffs: Floats, non_ego_payoffs: Floats) -> Solution:
-    """The verified equilibria of the game [E, N] in the order of `equilibrium_shares`.
+def solve(ego_payoffs: FloatArray, non_ego_payoffs: FloatArray) -> list[Equilibrium]:
+    """The verified equilibria of the game [E, N] in the order of `equilibrium_shares`; empty when none verified.
+
+    Of a continuum of equilibria (a degenerate game) they are some corners. There may be more of a game with more than
+    `MOST_SUPPORTS` pairs of supports.
 
     Raises ValueError when the matrices differ in shape, are empty, or contain a number that is not finite.
     """
@@ -103,17 +94,16 @@ def solve(ego_payoffs: Floats, non_ego_payoffs: Floats) -> Solution:
         raise ValueError(f"two matrices of one shape are needed, not {ego_payoffs.shape} and {non_ego_payoffs.shape}")
     if not (np.isfinite(ego_payoffs).all() and np.isfinite(non_ego_payoffs).all()):
         raise ValueError("a payoff is missing or not finite: the game can't be solved")
-    scaled = _scaled(ego_payoffs), _scaled(non_ego_payoffs)
-    rows, columns = _undominated(*scaled)
-    reduced = scaled[0][np.ix_(rows, columns)], scaled[1][np.ix_(rows, columns)]
-    pairs = (2 ** len(rows) - 1) * (2 ** len(columns) - 1)
-    few = pairs <= MOST_SUPPORTS
+    game = scaled(ego_payoffs), scaled(non_ego_payoffs)
+    rows, columns = _undominated(*game)
+    reduced = game[0][np.ix_(rows, columns)], game[1][np.ix_(rows, columns)]
+    few = (2 ** len(rows) - 1) * (2 ** len(columns) - 1) <= MOST_SUPPORTS
     found: dict[bytes, Equilibrium] = {}
 
-    def add_verified(candidates: Iterator[tuple[Floats, Floats]]) -> None:
+    def add_verified(candidates: Iterator[tuple[FloatArray, FloatArray]]) -> None:
         for x, y in candidates:
             candidate = _of_all_strategies(x, y, rows, columns, ego_payoffs.shape)
-            if candidate is not None and max(regrets(*scaled, candidate)) <= TOLERANCE + 2 * LP_ACCURACY:
+            if candidate is not None and max(regrets(*game, candidate)) <= TOLERANCE + 2 * LP_ACCURACY:
                 found.setdefault(_rounded(candidate).tobytes(), candidate)
 
     add_verified(_pure(reduced[0].shape))
@@ -124,26 +114,25 @@ def solve(ego_payoffs: Floats, non_ego_payoffs: Floats) -> Solution:
         add_verified(_by_vertices(*reduced))
     if not few or not found:
         add_verified(_by_integer_program(*reduced))
-    ordered = sorted(found.values(), key=lambda each: _rank(each, scaled[0]))
-    return Solution(equilibria=tuple(ordered), all_supports=few)
+    return sorted(found.values(), key=lambda each: _rank(each, game[0]))
 
 
-def _scaled(payoffs: Floats) -> Floats:
+def scaled(payoffs: FloatArray) -> FloatArray:
     """Payoffs scaled to 0..1, which changes no equilibrium; all 0 where they are all equal."""
     spread = np.ptp(payoffs)
     return (payoffs - payoffs.min()) / spread if spread > 0 else np.zeros_like(payoffs)
 
 
-def _rounded(each: Equilibrium) -> Floats:
+def _rounded(each: Equilibrium) -> FloatArray:
     return np.concatenate([each.ego_shares, each.non_ego_shares]).round(_DIGITS) + 0.0
 
 
-def _rank(each: Equilibrium, ego_payoffs: Floats) -> tuple[float, ...]:
+def _rank(each: Equilibrium, ego_payoffs: FloatArray) -> tuple[float, ...]:
     payoff = float(each.ego_shares @ ego_payoffs @ each.non_ego_shares)
     return (-round(payoff, _DIGITS), *(-_rounded(each)).tolist())
 
 
-def _undominated(ego_payoffs: Floats, non_ego_payoffs: Floats) -> tuple[list[int], list[int]]:
+def _undominated(ego_payoffs: FloatArray, non_ego_payoffs: FloatArray) -> tuple[list[int], list[int]]:
     """The rows and columns that remain after strategies strictly dominated by a pure one are removed repeatedly."""
     rows, columns = list(range(ego_payoffs.shape[0])), list(range(ego_payoffs.shape[1]))
     while True:
@@ -156,7 +145,7 @@ def _undominated(ego_payoffs: Floats, non_ego_payoffs: Floats) -> tuple[list[int
 
 
 def _of_all_strategies(
-    x: Floats, y: Floats, rows: list[int], columns: list[int], shape: tuple[int, ...]
+    x: FloatArray, y: FloatArray, rows: list[int], columns: list[int], shape: tuple[int, ...]
 ) -> Equilibrium | None:
     """A candidate of the reduced game as shares of all strategies; None when it is not a pair of distributions."""
     sides = []
@@ -170,19 +159,19 @@ def _of_all_strategies(
     return Equilibrium(ego_shares=sides[0], non_ego_shares=sides[1])
 
 
-def _pure(shape: tuple[int, ...]) -> Iterator[tuple[Floats, Floats]]:
+def _pure(shape: tuple[int, ...]) -> Iterator[tuple[FloatArray, FloatArray]]:
     for row in range(shape[0]):
         for column in range(shape[1]):
             yield np.eye(shape[0])[row], np.eye(shape[1])[column]
 
 
-def _by_supports(ego_payoffs: Floats, non_ego_payoffs: Floats) -> Iterator[tuple[Floats, Floats]]:
+def _by_supports(ego_payoffs: FloatArray, non_ego_payoffs: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
     from nashpy.algorithms.support_enumeration import support_enumeration
 
     yield from support_enumeration(ego_payoffs, non_ego_payoffs)
 
 
-def _by_vertices(ego_payoffs: Floats, non_ego_payoffs: Floats) -> Iterator[tuple[Floats, Floats]]:
+def _by_vertices(ego_payoffs: FloatArray, non_ego_payoffs: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
     from nashpy.algorithms.vertex_enumeration import vertex_enumeration
 
     try:  # its polytopes must be bounded: payoffs above 0
@@ -191,7 +180,9 @@ def _by_vertices(ego_payoffs: Floats, non_ego_payoffs: Floats) -> Iterator[tuple
         return
 
 
-def _by_integer_program(ego_payoffs: Floats, non_ego_payoffs: Floats) -> Iterator[tuple[Floats, Floats]]:
+def _by_integer_program(
+    ego_payoffs: FloatArray, non_ego_payoffs: FloatArray
+) -> Iterator[tuple[FloatArray, FloatArray]]:
     """Candidates for the equilibrium of the highest ego payoff, to `VALUE_ACCURACY`, of payoffs from 0 to 1.
 
     The integer program chooses which strategies may be played, on payoffs of `COARSE_DIGITS` and with a `SLACK`, so
@@ -250,9 +241,7 @@ def _by_integer_program(ego_payoffs: Floats, non_ego_payoffs: Floats) -> Iterato
         constraints.append(scipy.optimize.LinearConstraint(choice, -np.inf, float(rows.sum() + columns.sum()) - 1.0))
 
 
-def _indifferent(
-    payoffs: Floats, own: npt.NDArray[np.bool_], other: npt.NDArray[np.bool_], highest: bool
-) -> Floats | None:
+def _indifferent(payoffs: FloatArray, own: BoolArray, other: BoolArray, highest: bool) -> FloatArray | None:
     """Shares of the other player's strategies (only those in `other`) to which all of `own` are best responses, to
     `TOLERANCE`; None where there are none. With `highest`, the shares at which the best responses earn most."""
     count = payoffs.shape[1]

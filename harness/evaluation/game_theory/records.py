@@ -1,12 +1,9 @@
-"""The players of each arm, which the tables of games do not contain, and the tables of findings."""
+"""The players of each arm, which the tables of games do not contain."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
-
-import pandas as pd
 
 from harness.evaluation.research_questions import AloneBound
 
@@ -42,20 +39,3 @@ class Response:
     non_ego: str
     alone: tuple[AloneBound, ...] = ()
     """What the players of the pair have to achieve alone; otherwise there is no verdict on them."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class GameFindings:
-    """The four tables of findings, each a table of `columns.TABLES`; empty where the campaign does not ask for it."""
-
-    gaps: pd.DataFrame
-    crossplay: pd.DataFrame
-    equilibria: pd.DataFrame
-    generalisation: pd.DataFrame
-    cautions: Sequence[tuple[int, str]] = ()
-    """Seed and reason: the strategies of the cross-play that were not shown to drive the scene alone."""
-
-    @property
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """The tables by their names in the run folder."""
-        return {name: getattr(self, name) for name in ("gaps", "crossplay", "equilibria", "generalisation")}

@@ -86,7 +86,7 @@ def test_preparations__are_the_log_of_what_is_prepared(caplog: pytest.LogCapture
 def test_tell__a_training_that_did_not_learn_is_named_with_its_share_of_goals() -> None:
     console = Console(file=io.StringIO(), width=80)
     with StageProgress(STAGES, 0, console) as progress:
-        progress.tell(NAIVE, DID_NOT_LEARN, Goals(goals=3, games=100).below(0.97))
+        progress.tell(NAIVE, DID_NOT_LEARN, Goals(goals=3, played=100).below(0.97))
     assert console.file.getvalue() == (  # type: ignore[attr-defined]
         "did not learn: naive-seed1: alone it reaches its goal in 3 of 100 games (3 %), below 97 %\n"
     )

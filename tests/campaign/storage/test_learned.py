@@ -30,7 +30,7 @@ def judge(document: Campaign, goals: dict[str, Goals], **options: Any) -> dict[s
 
 
 def test_judged__a_player_that_cannot_drive_did_not_learn_whatever_stopped_its_training() -> None:
-    goals = {"naive_alone-seed1": Goals(goals=97, games=100), "anna_alone-seed1": Goals(goals=79, games=100)}
+    goals = {"naive_alone-seed1": Goals(goals=97, played=100), "anna_alone-seed1": Goals(goals=79, played=100)}
     for stopped in ("converged", "budget"):
         found = judge(campaign(), goals, stopped=stopped)
         assert found["naive-seed1"]["stopped"] == stopped
@@ -40,24 +40,24 @@ def test_judged__a_player_that_cannot_drive_did_not_learn_whatever_stopped_its_t
 
 
 def test_judged__entries_record_the_goals_and_the_bound() -> None:
-    found = judge(campaign(), {"naive_alone-seed1": Goals(goals=97, games=100)})["naive-seed1"]
+    found = judge(campaign(), {"naive_alone-seed1": Goals(goals=97, played=100)})["naive-seed1"]
     assert (found["goals"], found["played"], found["goal_share_asked"]) == (97, 100, 0.97)
     assert StageEntry.model_validate(found).goals == 97
 
 
 def test_judged__by_the_bounds_of_the_campaign() -> None:
-    goals = {"naive_alone-seed1": Goals(goals=0, games=100)}
+    goals = {"naive_alone-seed1": Goals(goals=0, played=100)}
     assert judge(campaign(competence={"ego_goal_share": 0.0}), goals)["naive-seed1"]["stopped"] == "converged"
 
 
 def test_judged__again_is_the_same() -> None:
-    document, goals = campaign(), {"anna_alone-seed1": Goals(goals=0, games=4)}
+    document, goals = campaign(), {"anna_alone-seed1": Goals(goals=0, played=4)}
     once = judge(document, goals)
     assert judged(once, document, plan(document, ["anna"]), goals) == once
 
 
 def test_judged__an_arm_of_which_no_game_could_be_played_shows_nothing() -> None:
-    found = judge(campaign(), {"anna_alone-seed1": Goals(goals=0, games=0)})
+    found = judge(campaign(), {"anna_alone-seed1": Goals(goals=0, played=0)})
     assert found["anna-seed1"]["stopped"] == "converged"
 
 
@@ -65,7 +65,7 @@ def test_judged__best_responses_and_trainings_that_are_not_done_are_left_alone()
     document = campaign(best_response={"steps": 1000, "starts": 1})
     before = entries(document)
     before["anna-seed1"]["status"] = "failed"
-    after = judged(before, document, plan(document, ["anna"]), {"anna_alone-seed1": Goals(goals=0, games=4)})
+    after = judged(before, document, plan(document, ["anna"]), {"anna_alone-seed1": Goals(goals=0, played=4)})
     assert after == before
 
 
@@ -73,7 +73,7 @@ def test_recorded_goals__are_those_of_arms() -> None:
     arm = {"kind": "assessment", "status": "done", "goals": 3, "played": 4}
     training = {"kind": "training", "status": "done", "goals": 3, "played": 4}
     found = recorded_goals({"a": arm, "b": training, "c": {"kind": "assessment", "status": "pending"}})
-    assert found == {"a": Goals(goals=3, games=4)}
+    assert found == {"a": Goals(goals=3, played=4)}
 
 
 def test_did_not_learn__a_manifest_without_the_goals_names_none() -> None:

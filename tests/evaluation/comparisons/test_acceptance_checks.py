@@ -10,11 +10,9 @@ import pandas as pd
 import pytest
 
 from harness.evaluation.comparisons.acceptance_checks import (
-    MEASURES,
     Evidence,
     judge,
     judged_ego,
-    unanswered,
     worst_of_each,
 )
 from harness.evaluation.comparisons.summary import summarise
@@ -27,6 +25,8 @@ from harness.evaluation.strategies import (
     RobustEgo,
     against_persona,
 )
+from harness.evaluation.tables import table_of
+from harness.reports.acceptance_wording import TITLES
 from tests.support.game_tables import arm, table
 
 RETRAINED = RetrainedEgo(against="speedy")
@@ -41,7 +41,13 @@ def evidence(games: Mapping[Arm, Sequence[int]], speeds: Mapping[Arm, float] | N
         for each, failed in games.items()
     ]
     episodes = table(*rows)
-    return Evidence(arms={each.name: each for each in games}, episodes=episodes, summary=summarise(episodes))
+    return Evidence(
+        arms={each.name: each for each in games},
+        episodes=episodes,
+        summary=summarise(episodes),
+        comparisons=table_of("comparisons"),
+        gaps=table_of("gaps"),
+    )
 
 
 def hundred(failures: int) -> list[int]:
@@ -67,17 +73,10 @@ def test_failure_rate__is_judged_by_the_upper_end_of_its_interval(failures: int,
 def test_bound__of_players_that_cannot_drive_the_scene_is_not_kept() -> None:
     run = evidence({NAIVE_VS: hundred(0), RETRAINED_VS: hundred(0)})
     asked = pd.DataFrame({"persona": ["speedy", "calm"], "seed": [1, 1], "reason": ["speedy can't drive it", ""]})
-    assert unanswered(asked) == {("speedy", 1)}
-    (check,) = judge({"failure_rate": 0.5}, "last", ["speedy"], [1], replace(run, unanswered=unanswered(asked)))
-    assert not check.measured
-    assert not check.passed
-
-
-def test_failure_rate__few_games_do_not_pass() -> None:
-    run = evidence({RETRAINED_VS: [0] * 10})
-    (check,) = judge({"failure_rate": 0.1}, "last", ["speedy"], [1], run)
-    assert check.limit == pytest.approx(0.3085, abs=1e-4)  # 1 - 0.025 ** (1 / 10)
-    assert not check.passed
+    run = replace(run, comparisons=asked)
+    (check,) = judge({"failure_rate": 0.5}, "last", ["speedy"], [1], run)
+    assert (check.measured, check.passed) == (False, False)
+    assert not run.unanswered("calm", 1)
 
 
 def test_failure_rate__covers_opponents_of_later_rounds() -> None:
@@ -90,8 +89,7 @@ def test_failure_rate__covers_opponents_of_later_rounds() -> None:
 
 def test_near_miss_rate__is_a_bound_of_its_own() -> None:
     run = evidence({RETRAINED_VS: hundred(0)})
-    episodes = run.episodes.assign(near_miss=pd.Series(hundred(95), dtype="Int64"))
-    run = Evidence(arms=run.arms, episodes=episodes, summary=run.summary)
+    run = replace(run, summary=summarise(run.episodes.assign(near_miss=hundred(95))))
     (check,) = judge({"near_miss_rate": 0.5}, "last", ["speedy"], [1], run)
     assert (check.value, check.games, check.passed) == (0.95, 100, False)
 
@@ -113,15 +111,15 @@ def test_gap_share__is_judged_by_the_upper_end_of_the_gap() -> None:
     row = {"role": "ego", "ego": "retrained_speedy", "non_ego": "speedy", "persona": "speedy", "seed": 1}
     row |= {"payoff": -20.0, "gap": 2.0, "ci_high": 3.0, "pairs": 50}
     run = evidence({RETRAINED_VS: hundred(0)})
-    run = Evidence(arms=run.arms, episodes=run.episodes, summary=run.summary, gaps=pd.DataFrame([row]))
+    run = replace(run, gaps=pd.DataFrame([row]))
     (check,) = judge({"gap_share": 0.12}, "last", ["speedy"], [1], run)
     assert (check.value, check.limit, check.games, check.passed) == (0.1, 0.15, 50, False)
 
 
-@pytest.mark.parametrize("bound", MEASURES)
+@pytest.mark.parametrize("bound", TITLES)
 def test_bound__that_was_not_measured_is_not_kept(bound: str) -> None:
     run = evidence({NAIVE_ALONE: hundred(0)})
-    run = Evidence(arms=run.arms | {RETRAINED_VS.name: RETRAINED_VS}, episodes=run.episodes, summary=run.summary)
+    run = replace(run, arms=run.arms | {RETRAINED_VS.name: RETRAINED_VS})
     (check,) = judge({bound: 1.0}, "last", ["speedy"], [1], run)
     assert (check.measured, check.passed, check.excess) == (False, False, math.inf)
 
@@ -129,7 +127,7 @@ def test_bound__that_was_not_measured_is_not_kept(bound: str) -> None:
 def test_judged_ego__is_that_of_the_last_round_that_was_played() -> None:
     later = Arm(ego=RetrainedEgo(against="speedy", round=4), non_ego=PersonaNonEgo(persona="speedy", round=3))
     played = evidence({NAIVE_VS: [0], RETRAINED_VS: [0], later: [0]})
-    settled = Evidence(arms=played.arms, episodes=played.episodes[:2], summary=played.summary[:2])
+    settled = replace(played, summary=played.summary[:2])
     assert judged_ego("last", "speedy", 1, played) == RetrainedEgo(against="speedy", round=4)
     assert judged_ego("last", "speedy", 1, settled) == RETRAINED
     assert judged_ego("last", "distracted", 1, played) == NaiveEgo()
@@ -141,7 +139,7 @@ def test_preventable_failure_rate__is_that_of_any_reference_driver_from_the_star
     run = evidence({RETRAINED_VS: hundred(7)})
     row = {"arm": RETRAINED_VS.name, "seed": 1, "driver": "any", "from_start_rate": 0.02, "from_start_rate_high": 0.07}
     judged = pd.DataFrame([row, row | {"driver": "rss", "from_start_rate": 0.01}])
-    run = Evidence(arms=run.arms, episodes=run.episodes, summary=run.summary, preventability=judged)
+    run = replace(run, preventability=judged)
     strict, lenient = (
         judge({"preventable_failure_rate": bound}, "last", ["speedy"], [1], run)[0] for bound in (0.05, 0.08)
     )
@@ -152,6 +150,6 @@ def test_preventable_failure_rate__is_that_of_any_reference_driver_from_the_star
 def test_preventable_failure_rate__without_failures_is_that_of_failures() -> None:
     run = evidence({RETRAINED_VS: hundred(0)})
     none = pd.DataFrame(columns=["arm", "seed", "driver"])
-    run = Evidence(arms=run.arms, episodes=run.episodes, summary=run.summary, preventability=none)
+    run = replace(run, preventability=none)
     (check,) = judge({"preventable_failure_rate": 0.05}, "last", ["speedy"], [1], run)
     assert (check.value, check.limit) == (0.0, pytest.approx(0.0362, abs=1e-4))

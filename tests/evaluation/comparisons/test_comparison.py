@@ -1,16 +1,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy import stats
 
-from harness.evaluation.columns import TABLES
-from harness.evaluation.comparisons.comparison import METRICS, compare, holm
+from harness.evaluation.comparisons.comparison import compare, holm
 from harness.evaluation.research_questions import Question, Verdict
 
 RQ1 = Question(question="RQ1", persona="speedy", seed=1, baseline="naive_alone", treatment="naive_vs_speedy")
@@ -77,36 +76,6 @@ def test_compare__p_value_of_two_degrees_of_freedom_has_its_closed_form():
     assert math.isnan(row["mcnemar_p"])
 
 
-@pytest.mark.parametrize("question", [RQ1, RQ2])
-def test_compare__agrees_with_pandas_and_scipy_on_the_same_games(question):
-    random = np.random.default_rng(20)
-    count = 100
-    arms = [
-        games(arm, random.random(count) < rate, random.normal(speed, 3, count))
-        for arm, rate, speed in [
-            (question.baseline, 0.1, 21),
-            (question.treatment, 0.3, 20),
-        ]
-    ]
-    episodes = pd.concat(arms).sample(frac=1, random_state=3)
-    for metric, row in zip(METRICS, both_metrics(question, episodes), strict=True):
-        wide = episodes.pivot(index="episode", columns="arm", values=metric.column).astype(float)
-        more, less = wide[question.treatment], wide[question.baseline]
-        if (question.question, metric.name) in {("RQ1", "mean_speed"), ("RQ2", "failure")}:
-            more, less = less, more
-        test = stats.ttest_rel(more, less, alternative="greater")
-        interval = stats.ttest_rel(more, less).confidence_interval(0.95)
-        difference = more - less
-        assert same(row["mean_difference"], difference.mean())
-        assert (same(row["t"], test.statistic), same(row["p_value"], test.pvalue)) == (True, True)
-        assert (same(row["ci_low"], interval.low), same(row["ci_high"], interval.high)) == (True, True)
-        assert same(row["effect_size"], difference.mean() / difference.std())
-        if metric.name == "failure":
-            counts = pd.crosstab(more, less)
-            in_favour, against = counts.loc[1.0, 0.0], counts.loc[0.0, 1.0]
-            assert same(row["mcnemar_p"], stats.binom.sf(in_favour - 1, in_favour + against, 0.5))
-
-
 def test_compare__worse_is_positive_for_rq1_and_better_is_positive_for_rq2():
     calm = [0] * 10, np.linspace(20, 22, 10)
     hurt = [1, 0, 1, 1, 0, 1, 0, 1, 1, 0], np.linspace(15, 19, 10)
@@ -155,7 +124,6 @@ def test_compare__pairs_by_episode_whatever_the_order_of_rows():
 
 
 def test_compare__training_seeds_are_not_mixed():
-    other_seed = Question(question="RQ1", persona="speedy", seed=2, baseline="naive_alone", treatment="naive_vs_speedy")
     episodes = pd.concat(
         [
             games("naive_alone", [0, 0, 0]),
@@ -164,32 +132,20 @@ def test_compare__training_seeds_are_not_mixed():
             games("naive_vs_speedy", [1, 1, 0], seed=2),
         ]
     )
-    table = compare([RQ1, other_seed], episodes, 0.01)
+    table = compare([RQ1, replace(RQ1, seed=2)], episodes, 0.01)
     failures = table[table["metric"] == "failure"]
     assert failures["mean_difference"].tolist() == pytest.approx([1 / 3, 2 / 3])
 
 
-def test_compare__an_arm_that_was_never_played_leaves_out_every_pair():
-    failure, mean_speed = both_metrics(RQ1, games("naive_alone", [0, 0, 1]))
-    for row in (failure, mean_speed):
+def test_compare__less_than_two_pairs_are_not_enough():
+    for row in both_metrics(RQ1, games("naive_alone", [0, 0, 1])):
         assert (row["pairs"], row["pairs_left_out"]) == (0, 3)
         assert math.isnan(row["mean_difference"])
         assert (row["rejects_h0"], row["verdict"]) == (False, "not enough pairs")
-
-
-def test_compare__one_pair_is_not_enough():
     failure, _ = both_metrics(RQ1, games("naive_alone", [0]), games("naive_vs_speedy", [1]))
     assert (failure["pairs"], failure["mean_difference"]) == (1, 1)
     assert all(math.isnan(failure[column]) for column in ("t", "p_value", "ci_low", "mcnemar_p"))
     assert failure["verdict"] == "not enough pairs"
-
-
-def test_compare__equal_arms_are_no_difference():
-    for row in both_metrics(RQ1, games("naive_alone", [0] * 100), games("naive_vs_speedy", [0] * 100)):
-        assert row["mean_difference"] == 0
-        untested = ("t", "p_value", "p_holm", "effect_size", "ci_low", "ci_high")
-        assert all(math.isnan(row[column]) for column in untested)
-        assert (row["rejects_h0"], row["verdict"]) == (False, "no difference")
 
 
 def test_compare__equal_differences_that_are_not_zero_have_no_t_and_are_never_significant():
@@ -197,9 +153,7 @@ def test_compare__equal_differences_that_are_not_zero_have_no_t_and_are_never_si
     failure, mean_speed = both_metrics(RQ1, *arms)
     for row in (failure, mean_speed):
         assert row["mean_difference"] == 1
-        assert math.isnan(row["t"])
-        assert math.isnan(row["p_value"])
-        assert math.isnan(row["p_holm"])
+        assert all(math.isnan(row[name]) for name in ("t", "p_value", "p_holm"))
         assert (row["rejects_h0"], row["verdict"]) == (False, "no t statistic: all differences equal")
     assert same(failure["mcnemar_p"], 2.0**-10)  # which does exist
 
@@ -230,15 +184,12 @@ def test_compare__verdict_says_when_only_the_uncorrected_p_value_is_significant(
 
 
 def test_compare__holm_is_over_all_rows_that_have_a_p_value():
-    questions = [
-        Question(question="RQ1", persona=str(k), seed=k, baseline="naive_alone", treatment="naive_vs_x")
-        for k in (1, 2, 3)
-    ]
+    questions = [replace(RQ1, seed=k) for k in (1, 2, 3)]
     random = np.random.default_rng(9)
     episodes = pd.concat(
         games(arm, [0] * 20, random.normal(speed, 2, 20), seed=k)
         for k in (1, 2, 3)
-        for arm, speed in (("naive_alone", 21), ("naive_vs_x", 20))
+        for arm, speed in (("naive_alone", 21), ("naive_vs_speedy", 20))
     )
     table = compare(questions, episodes, 0.05)
     tests = table[table["metric"] == "mean_speed"]
@@ -246,18 +197,6 @@ def test_compare__holm_is_over_all_rows_that_have_a_p_value():
     by_hand = [3 * first, max(3 * first, 2 * second), max(3 * first, 2 * second, third)]
     assert sorted(tests["p_holm"]) == pytest.approx([min(p, 1) for p in by_hand])
     assert table.loc[table["metric"] == "failure", "p_holm"].isna().all()
-
-
-def test_compare__columns_and_dtypes_are_those_of_the_table_even_when_empty():
-    episodes = pd.concat([games("naive_alone", [0, 1]), games("naive_vs_speedy", [1, 1])])
-    for table in (compare([RQ1], episodes, 0.01), compare([], episodes, 0.01)):
-        assert list(table.columns) == list(TABLES["comparisons"])
-
-
-@pytest.mark.parametrize("significance", [0, 1, -0.01, math.nan])
-def test_compare__refuses_a_wrong_significance(significance):
-    with pytest.raises(ValueError, match="significance"):
-        compare([RQ1], games("naive_alone", [0]), significance)
 
 
 def test_compare__refuses_two_games_of_one_episode():
@@ -272,11 +211,8 @@ def test_compare__refuses_two_games_of_one_episode():
 )
 @settings(max_examples=50, deadline=None)
 def test_compare__an_arm_against_itself_rejects_nothing(failed, speeds, significance):
-    itself = [
-        Question(question=rq, persona="x", seed=1, baseline="naive_vs_x", treatment="naive_vs_x")
-        for rq in ("RQ1", "RQ2")
-    ]
-    table = compare(itself, games("naive_vs_x", failed, speeds[: len(failed)]), significance)
+    itself = [replace(each, baseline="naive_vs_speedy", treatment="naive_vs_speedy") for each in (RQ1, RQ2)]
+    table = compare(itself, games("naive_vs_speedy", failed, speeds[: len(failed)]), significance)
     assert not table["rejects_h0"].any()
     assert set(table["verdict"]) <= {Verdict.NO_DIFFERENCE.value, Verdict.NOT_ENOUGH_PAIRS.value}
     assert (table["pairs"] + table["pairs_left_out"] == len(failed)).all()
@@ -285,13 +221,12 @@ def test_compare__an_arm_against_itself_rejects_nothing(failed, speeds, signific
 def test_compare__rejects_random_arms_without_a_difference_at_the_rate_of_significance():
     random = np.random.default_rng(2024)
     campaigns, count = 600, 60
-    arms, questions = [], []
+    arms = []
     for k in range(campaigns):
         start = random.normal(20, 2, count)  # the pair's common start, so that pairs correlate
-        for arm in ("one", "other"):
+        for arm in (RQ1.baseline, RQ1.treatment):
             arms.append(games(arm, random.random(count) < 0.2, start + random.normal(0, 1, count), seed=k))
-        questions.append(Question(question="RQ1", persona="x", seed=k, baseline="one", treatment="other"))
-    table = compare(questions, pd.concat(arms), 0.05)
+    table = compare([replace(RQ1, seed=k) for k in range(campaigns)], pd.concat(arms), 0.05)
     three_deviations = 3 * math.sqrt(0.05 * 0.95 / campaigns)
     assert table.groupby("metric")["rejects_h0"].mean().max() < 0.05 + three_deviations
     assert (table["p_holm"] < 0.05).sum() == 0

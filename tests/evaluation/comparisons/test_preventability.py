@@ -63,10 +63,6 @@ def test_count__each_driver_in_each_verdict(counts: dict[str, dict[str, Any]]) -
     }
 
 
-def test_count__any_leaves_the_upper_bound_out(counts: dict[str, dict[str, Any]]) -> None:
-    assert counts[ANY]["from_conflict_prevented"] == 1
-
-
 def test_count__shares_are_of_failures_and_rates_of_games(counts: dict[str, dict[str, Any]]) -> None:
     both = counts[ANY]
     assert (both["episodes"], both["failures"]) == (10, 3)
@@ -88,7 +84,3 @@ def test_sentences__say_both_verdicts_apart(counts: dict[str, dict[str, Any]]) -
     ]
     assert found.rate == pytest.approx(0.2)
     assert not preventability_of(table, GAMES, "retrained_vs_speedy")
-
-
-def test_count__an_arm_without_failures_has_no_rows() -> None:
-    assert count_prevented(GAMES.iloc[:0], episodes([0, 0])).empty

@@ -8,7 +8,6 @@ import pytest
 from harness.evaluation.columns import TABLES
 from harness.evaluation.game_theory.crossplay import crossplay, matrices
 from harness.evaluation.game_theory.records import Pairing
-from harness.evaluation.tables import read_csv, typed, write_csv
 from tests.support.game_tables import arm, table
 
 NAIVE = Pairing(arm="naive_vs_speedy", seed=1, ego="naive", non_ego="speedy", persona="speedy")
@@ -47,18 +46,9 @@ def test_crossplay__unmeasured_values_are_empty_and_unplayed_games_are_counted()
     assert all(math.isnan(retrained[name]) for name, column in TABLES["crossplay"].items() if column.dtype == "float64")
 
 
-def test_crossplay__a_pairing_or_an_episode_twice_is_refused():
+def test_crossplay__a_pairing_twice_is_refused():
     with pytest.raises(ValueError, match="are paired twice"):
         rows([NAIVE, NAIVE], arm("naive_vs_speedy", ego_failed=[0]))
-    with pytest.raises(ValueError, match="more than once"):
-        rows([NAIVE], arm("naive_vs_speedy", ego_failed=[0]), arm("naive_vs_speedy", ego_failed=[0]))
-
-
-def test_crossplay__is_written_and_read_as_a_table_of_the_run(tmp_path):
-    found = crossplay([NAIVE, RETRAINED], table(arm("naive_vs_speedy", ego_failed=[1, 0, 0])))
-    assert list(found.columns) == list(TABLES["crossplay"])
-    write_csv(found, tmp_path / "crossplay.csv")
-    assert read_csv(tmp_path / "crossplay.csv").equals(typed(found))
 
 
 def test_matrices__have_egos_as_rows_and_an_empty_cell_where_nothing_was_played():

@@ -6,11 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from harness.evaluation.columns import TABLES
 from harness.evaluation.game_theory import empirical_game as module
 from harness.evaluation.game_theory.empirical_game import SolutionKind, equilibria
-from harness.evaluation.game_theory.nash import Solution
-from harness.evaluation.tables import read_csv, table_of, typed, write_csv
+from harness.evaluation.tables import table_of
 from tests.support.game_tables import findings
 
 NASH, SAFEST, LEFT_OUT = (kind.value for kind in (SolutionKind.NASH, SolutionKind.SAFEST, SolutionKind.NOT_PLAYED))
@@ -104,7 +102,7 @@ def test_left_out__when_every_ego_lacks_a_cell_there_is_no_game():
 
 
 def test_none_verified__has_rows_without_numbers(monkeypatch):
-    monkeypatch.setattr(module, "solve", lambda *game: Solution(equilibria=(), all_supports=True))
+    monkeypatch.setattr(module, "solve", lambda *game: [])
     found = rows(equilibria(played(PENNIES)), game="speedy")
     assert [row["solution"] for row in found] == [SolutionKind.NOT_VERIFIED.value] * 4
     for row in found:
@@ -116,17 +114,6 @@ def test_seeds__are_separate_games():
     found = equilibria(pd.concat([played(PENNIES, seed=1), played(PENNIES[:1], seed=2)]))
     assert [row["share"] for row in rows(found, seed=2, solution=NASH)] == [1, 1]
     assert len(rows(found, seed=1, solution=NASH)) == 4
-
-
-def test_equilibria__are_written_and_read_as_a_table_of_the_run(tmp_path):
-    found = findings(seeds=(1, 2), games=20).equilibria
-    assert list(found.columns) == list(TABLES["equilibria"])
-    write_csv(found, tmp_path / "equilibria.csv")
-    assert read_csv(tmp_path / "equilibria.csv").equals(typed(found))
-
-
-def test_equilibria__of_no_crossplay_are_an_empty_table():
-    assert not len(equilibria(played([])))
 
 
 def test_equilibria__shares_of_each_solution_and_role_are_a_distribution():

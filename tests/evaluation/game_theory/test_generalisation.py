@@ -5,19 +5,14 @@ from dataclasses import replace
 
 import pytest
 
-from harness.evaluation.columns import TABLES
 from harness.evaluation.game_theory.findings import find
 from harness.evaluation.game_theory.generalisation import generalisation
 from harness.evaluation.game_theory.records import Pairing
 from harness.evaluation.research_questions import AloneBound, Verdict
-from harness.evaluation.tables import read_csv, typed, write_csv
 from tests.support.game_tables import TRAINED_AGAINST, a_campaign, arm, findings, table
 
 NAIVE = Pairing(arm="naive_vs_distracted", seed=1, ego="naive", non_ego="distracted", persona="distracted")
-RETRAINED = Pairing(
-    arm="retrained_vs_distracted", seed=1, ego="retrained_speedy", non_ego="distracted", persona="distracted"
-)
-ITS_OWN = Pairing(arm="retrained_vs_speedy", seed=1, ego="retrained_speedy", non_ego="speedy", persona="speedy")
+RETRAINED = replace(NAIVE, arm="retrained_vs_distracted", ego="retrained_speedy")
 
 
 def test_generalisation__agrees_with_the_arithmetic_on_paper():
@@ -27,12 +22,7 @@ def test_generalisation__agrees_with_the_arithmetic_on_paper():
         arm("retrained_vs_distracted", ego_failed=[0, 0, 1, 0, 0, 0, 0, 0]),
     )
     (row,) = generalisation({"retrained_speedy": ("speedy",)}, [NAIVE, RETRAINED], episodes, 0.01).to_dict("records")
-    assert (row["ego"], row["met"], row["persona"], row["non_ego"]) == (
-        "retrained_speedy",
-        "speedy",
-        "distracted",
-        "distracted",
-    )
+    assert [row[name] for name in ("ego", "met", "persona")] == ["retrained_speedy", "speedy", "distracted"]
     assert (row["pairs"], row["failure_rate"], row["naive_failure_rate"]) == (8, 0.125, 0.375)
     assert (row["fewer_failures"], row["share_of_naive"]) == (0.25, pytest.approx(1 / 3))
     half = 2.364624 * math.sqrt(3 / 14 / 8)  # 97.5 % quantile of t with 7 degrees of freedom
@@ -66,18 +56,6 @@ def test_generalisation__a_naive_ego_that_never_fails_has_no_share():
     (row,) = generalisation({"retrained_speedy": ("speedy",)}, [NAIVE, RETRAINED], episodes, 0.01).to_dict("records")
     assert math.isnan(row["share_of_naive"])
     assert row["fewer_failures"] == -0.5
-
-
-def test_generalisation__an_ego_trained_against_all_has_no_row():
-    found = generalisation({"retrained_speedy": ("speedy",)}, [ITS_OWN], table(arm("x", ego_failed=[0])), 0.01)
-    assert list(found.columns) == list(TABLES["generalisation"])
-    assert not len(found)
-
-
-def test_generalisation__is_written_and_read_as_a_table_of_the_run(tmp_path):
-    found = findings(seeds=(1, 2), games=20).generalisation
-    write_csv(found, tmp_path / "generalisation.csv")
-    assert read_csv(tmp_path / "generalisation.csv").equals(typed(found))
 
 
 # --- all four tables at once ---
