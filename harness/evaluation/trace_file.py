@@ -7,9 +7,9 @@ not depend on whether the segments were played in one run.
 from __future__ import annotations
 
 import json
+import math
 from collections import OrderedDict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType, TracebackType
 from typing import Any
@@ -17,6 +17,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pyarrow as pa
+import pyarrow.compute
+import pyarrow.dataset
 import pyarrow.parquet as pq
 
 from harness.errors import UsageError
@@ -96,22 +98,14 @@ def join_traces(parts: Sequence[Path], path: Path, labels: Mapping[str, str | in
 def read_trace(path: Path, episode: int) -> pd.DataFrame:
     """One game's trace; empty if the file has none of that episode. Raises UsageError if it is not a file of traces,
     or contains values that no game can have."""
-    try:
-        check_file(path, _MOST_BYTES)
-        table = pq.read_table(path, filters=[("episode", "==", episode)])
-        _check_schema(table.schema)
-        frame = table.to_pandas()
-        _check_game(frame)
-    except (OSError, ValueError, MemoryError, pa.ArrowException) as error:
-        raise _damaged(path, error) from None
-    return _with_strings(frame)
+    return TraceReader().read(path, episode)
 
 
 def read_traces(path: Path) -> Iterator[tuple[int, pd.DataFrame]]:
     """The games of a file in order, each with its episode, as of `read_trace`. Reads one segment at a time."""
     rest = SCHEMA.empty_table().to_pandas()
     for group in _row_groups(path):
-        rows = _frame(group)
+        rows = _with_strings(group.to_pandas())
         rows = pd.concat((rest, rows)) if len(rest) else rows
         games = [(int(episode), game) for episode, game in rows.groupby("episode", sort=False)]
         for episode, game in games[:-1]:
@@ -121,74 +115,54 @@ def read_traces(path: Path) -> Iterator[tuple[int, pd.DataFrame]]:
         yield int(rest["episode"].iloc[0]), rest.reset_index(drop=True)
 
 
+_Segment = tuple[float, float, pyarrow.dataset.ParquetFileFragment]
+"""The lowest and highest episode of a row group, and where it is in its file."""
+
+
 class TraceReader:
-    """Reads many games, of several files, in any order. A file's footer is read once, and a segment is checked once for
-    all its games. A segment stays in memory as long as the segments that were read last have no more than
-    `MOST_KEPT_ROWS` rows; it is kept as it is in the file, since rows become a frame much faster for one game than for
-    all."""
+    """Reads many games, of several files, in any order. A file's footer is read once. A segment stays in memory as long
+    as the segments that were read last have no more than `MOST_KEPT_ROWS` rows; it is kept as it is in the file, since
+    rows become a frame much faster for one game than for all."""
 
     def __init__(self) -> None:
-        self._footers: dict[Path, _Footer] = {}
-        self._checked: set[tuple[Path, int]] = set()
-        self._kept: OrderedDict[tuple[Path, int], pa.Table] = OrderedDict()
-        self._rows = 0
+        self._segments: dict[Path, list[_Segment]] = {}
+        self._kept: OrderedDict[tuple[str, int], pa.Table] = OrderedDict()
 
     def read(self, path: Path, episode: int) -> pd.DataFrame:
-        """As `read_trace`. Damage to any game of the segment is raised."""
+        """As `read_trace`."""
         try:
-            if path not in self._footers:
-                self._footers[path] = _footer(path)
-            groups = self._footers[path].groups_with(episode)
-            if len(groups) > 1:
-                return read_trace(path, episode)
-            segment = self._segment(path, groups[0]) if groups else SCHEMA.empty_table()
+            if path not in self._segments:
+                self._segments[path] = _segments_of(path)
+            segments = self._segments[path]
+            tables = [self._table(segment) for low, high, segment in segments if low <= episode <= high]
+            rows = pa.concat_tables([SCHEMA.empty_table(), *tables])
+            rows = rows.filter(pyarrow.compute.equal(rows["episode"], episode))
+            frame = rows.unify_dictionaries().to_pandas()
+            _check_game(frame)
         except (OSError, ValueError, MemoryError, pa.ArrowException) as error:
             raise _damaged(path, error) from None
-        return _frame(segment.filter(pa.array(segment["episode"].to_numpy() == episode)))
+        return _with_strings(frame)
 
-    def _segment(self, path: Path, group: int) -> pa.Table:
-        """The games of a row group."""
-        place = (path, group)
-        if place in self._kept:
-            self._kept.move_to_end(place)
-            return self._kept[place]
-        with pq.ParquetFile(path, metadata=self._footers[path].metadata) as file:
-            segment = file.read_row_group(group)
-        if place not in self._checked:
-            _check_game(segment.to_pandas(), ["episode", "step", "player"])
-            self._checked.add(place)
-        self._kept[place] = segment
-        self._rows += len(segment)
-        while self._rows > MOST_KEPT_ROWS and len(self._kept) > 1:
-            self._rows -= len(self._kept.popitem(last=False)[1])
-        return segment
+    def _table(self, segment: pyarrow.dataset.ParquetFileFragment) -> pa.Table:
+        place = (segment.path, segment.row_groups[0].id)
+        if place not in self._kept:
+            self._kept[place] = segment.to_table()
+        self._kept.move_to_end(place)
+        while len(self._kept) > 1 and sum(map(len, self._kept.values())) > MOST_KEPT_ROWS:
+            self._kept.popitem(last=False)
+        return self._kept[place]
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Footer:
-    """The footer of a file, with the lowest and highest episode [R] of each row group."""
-
-    metadata: pq.FileMetaData
-    lowest: FloatArray
-    highest: FloatArray
-
-    def groups_with(self, episode: int) -> list[int]:
-        """The row groups that may have rows of an episode."""
-        groups: list[int] = np.flatnonzero((self.lowest <= episode) & (episode <= self.highest)).tolist()
-        return groups
-
-
-def _footer(path: Path) -> _Footer:
-    """Raises ValueError, OSError or ArrowException unless this is a file of traces."""
+def _segments_of(path: Path) -> list[_Segment]:
+    """The row groups of a file. Raises ValueError, OSError or ArrowException unless this is a file of traces."""
     check_file(path, _MOST_BYTES)
-    with pq.ParquetFile(path) as file:
-        _check_schema(file.schema_arrow)
-        metadata = file.metadata
-    column = SCHEMA.get_field_index("episode")
-    groups = [metadata.row_group(group).column(column).statistics for group in range(metadata.num_row_groups)]
-    spans = [(each.min, each.max) if each is not None and each.has_min_max else (-np.inf, np.inf) for each in groups]
-    lowest, highest = np.array(spans, dtype=float).reshape(-1, 2).T
-    return _Footer(metadata=metadata, lowest=lowest, highest=highest)
+    (file,) = pyarrow.dataset.dataset(path, format="parquet").get_fragments()
+    _check_schema(file.physical_schema)
+    everything = {"min": -math.inf, "max": math.inf}
+    spans = [
+        ((each.row_groups[0].statistics or {}).get("episode", everything), each) for each in file.split_by_row_group()
+    ]
+    return [(span["min"], span["max"], segment) for span, segment in spans]
 
 
 def _write(groups: Iterable[pa.Table], path: Path, schema: pa.Schema = SCHEMA) -> None:
@@ -207,10 +181,6 @@ def _row_groups(path: Path) -> Iterator[pa.Table]:
     with pq.ParquetFile(path) as file:
         for number in range(file.num_row_groups):
             yield file.read_row_group(number)
-
-
-def _frame(table: pa.Table) -> pd.DataFrame:
-    return _with_strings(table.to_pandas())
 
 
 def _with_strings(frame: pd.DataFrame) -> pd.DataFrame:
@@ -241,12 +211,12 @@ def _check_schema(schema: pa.Schema) -> None:
         raise ValueError(f"its columns are not those of a trace: {', '.join(different)[:200]}")
 
 
-def _check_game(frame: pd.DataFrame, unique: Sequence[str] = ("step", "player")) -> None:
+def _check_game(frame: pd.DataFrame) -> None:
     _check_numbers(frame[_NUMBERS].to_numpy(float))
     steps = frame["step"]
     if frame.isna().any(axis=None) or (len(frame) and not (0 <= steps.min() <= steps.max() <= _MOST_STEPS)):
         raise ValueError("it has empty cells, or steps out of range")
-    if frame.duplicated(list(unique)).any():
+    if frame.duplicated(["step", "player"]).any():
         raise ValueError("a road user has two rows in one step")
 
 

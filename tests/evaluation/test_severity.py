@@ -14,14 +14,11 @@ import pandas as pd
 import pytest
 
 from harness.environments.recorded import kinds_of
-from harness.evaluation.columns import TABLES
 from harness.evaluation.measured_game import METRICS_OF_GAMES, measured
 from harness.evaluation.recorded_game import BodyKind
 from harness.evaluation.severity.contact import impact_angle_rad, needed_braking_mps2, post_encroachment_s
 from harness.evaluation.severity.masses import mass_kg
 from harness.evaluation.severity.measures import side_of
-from harness.evaluation.tables import typed
-from harness.evaluation.worst_first import worst_first
 from harness.game.geometry import Box
 from harness.game.sight import Hiding
 from harness.game.world import World
@@ -63,14 +60,6 @@ def test_contact__rear_end_of_equal_cars_shares_the_closing_speed(merge: Any) ->
     assert cells["impact_side"] == "front"
     assert cells["near_miss"] == 0
     assert cells["severity"] == pytest.approx(305.0)
-
-
-def test_contact__the_lighter_one_changes_its_velocity_more(merge: Any) -> None:
-    # a truck of 4500 kg, a car of 1500 kg, 10 m/s: 10 * 4500 / 6000 = 7.5 and 10 * 1500 / 6000 = 2.5
-    ego = rows("ego", along(20.0, -1.6, 0.0, 14.0, 3), end="collision")
-    cells = severity(merge, ego, rows("non_ego", along(26.5, -1.6, 0.0, 4.0, 3), kind="truck"))
-    assert (cells["ego_delta_v_mps"], cells["other_delta_v_mps"]) == (pytest.approx(7.5), pytest.approx(2.5))
-    assert cells["severity"] == pytest.approx(307.5)
 
 
 def test_contact__a_pedestrian_decides_how_severe_it_is(merge: Any) -> None:
@@ -236,28 +225,6 @@ def test_without_the_ego__the_person_is_judged_by_severity_alone(merge: Any) -> 
 
 
 # --- tables -----------------------------------------------------------------------------------------------------
-
-
-def test_masses__of_two_wheels_include_the_rider() -> None:
-    assert (mass_kg("bicycle"), mass_kg("passenger"), mass_kg("custom1")) == (80.0, 1500.0, 1500.0)
-
-
-def test_worst_first__a_harder_contact_comes_before_an_earlier_episode() -> None:
-    common = {"arm": "a", "persona": "", "seed": 1, "non_ego_outcome": "", "error": ""}
-    ends = [
-        ("collision", 301.5),
-        ("goal", 60.0),
-        ("collision", 308.0),
-        ("error", None),
-        ("goal", None),
-        ("rail", 212.0),
-    ]
-    games = [
-        {**common, "episode": k, "ego_outcome": end, "severity": number, "ego_failed": None}
-        for k, (end, number) in enumerate(ends)
-    ]
-    table = typed(pd.DataFrame(games, columns=list(TABLES["episodes"])))
-    assert worst_first(table)["episode"].tolist() == [2, 0, 5, 1, 4, 3]
 
 
 def test_page__is_the_one_of_the_command() -> None:

@@ -187,7 +187,11 @@ def episodes() -> pd.DataFrame:
         ("x_alone", 1, 2, "", np.nan, np.nan, "error"),
         ("naive_alone", 1, 0, "goal", 0.0, np.nan, ""),
     ]
-    return pd.DataFrame(rows, columns=columns)
+    table = pd.DataFrame(rows, columns=columns)
+    judged = table["ego_outcome"].where(table["ego_outcome"] != "").fillna(table["non_ego_outcome"])
+    table["severity"] = judged.map({"collision": 300.0, "rail": 200.0, "timeout": 100.0})
+    table.loc[4, "severity"] = 305.0
+    return table
 
 
 def key(frame: pd.DataFrame) -> list[tuple[str, int, int]]:
@@ -205,18 +209,18 @@ def test_choose_games__every_failure_and_the_first_two_others() -> None:
 
 
 def test_choose_games__of_very_many_failures_the_worst_of_each_arm_and_seed() -> None:
-    row = {"arm": "naive_vs_x", "ego_outcome": "rail", "ego_failed": 1.0, "non_ego_outcome": "goal"}
+    row = {"arm": "naive_vs_x", "ego_outcome": "rail", "ego_failed": 1.0, "non_ego_outcome": "goal", "severity": 200.0}
     rails = [{**row, "seed": seed, "episode": k, "ego_min_ttc_s": k / 100} for seed in (1, 2) for k in range(150)]
-    crashes = [{**row, "seed": 1, "episode": 150 + k, "ego_outcome": "collision"} for k in range(30)]
+    crashes = [{**row, "seed": 1, "episode": 150 + k, "ego_outcome": "collision", "severity": 300.0} for k in range(30)]
     chosen = choose_games(pd.DataFrame([*rails, *crashes]))
     first = [("naive_vs_x", 1, k) for k in (*range(MOST_FAILURES_PER_ARM - 30), *range(150, 180))]
     assert sorted(key(chosen)) == [*first, *[("naive_vs_x", 2, k) for k in range(MOST_FAILURES_PER_ARM)]]
 
 
-def test_worst_first__by_failure_then_time_to_collision_then_name() -> None:
+def test_worst_first__by_severity_then_time_to_collision_then_name() -> None:
     expected = [
-        ("naive_vs_x", 2, 0),  # collisions
-        ("naive_vs_x", 1, 4),
+        ("naive_vs_x", 1, 4),  # collisions, the harder one first
+        ("naive_vs_x", 2, 0),
         ("naive_vs_x", 1, 6),  # rails
         ("x_alone", 1, 0),
         ("naive_vs_x", 1, 3),  # timeouts

@@ -25,7 +25,7 @@ from harness.evaluation.people import people_in
 from harness.evaluation.rule_book.cause_lines import causes_in_words
 from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import read_trace
-from harness.evaluation.worst_first import FAILURES, severities, worst_first
+from harness.evaluation.worst_first import FAILURES, worst_first
 from harness.replay import follow_in_sumo_gui, names_in_pictures, replay_name, write_film, write_replay
 from harness.replay.vehicles import legend
 from harness.road.scene.open_scene import OpenScene, open_scene
@@ -67,7 +67,7 @@ def listed_games(run: Path, chosen: GameList) -> ListedGames:
     episodes = episodes_of(folder)
     causes = causes_in_words(read_csv(folder.path / "causes.csv"))
     episodes = _chosen(run, episodes, chosen)
-    ordered = worst_first(episodes.assign(severity=severities(episodes)))
+    ordered = worst_first(episodes)
     games, pages = _page(ordered, chosen)
     players = ("ego", *people_in(episodes.columns))
     columns = ["arm", "seed", "episode", *(f"{name}_outcome" for name in players), "ego_min_ttc_s", "severity"]

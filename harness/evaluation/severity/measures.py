@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
-from typing import Any
+from functools import lru_cache
 
 import numpy as np
 
@@ -30,37 +29,31 @@ _MINDERHOUD = "Minderhoud and Bovy 2001, Extended time-to-collision measures for
 
 @dataclass(frozen=True, kw_only=True)
 class Impact:
-    """A contact of two bodies at the end of a game."""
+    """A contact of two bodies at the end of a game; None of everything without one."""
 
-    closing_mps: float
-    own_kg: float
-    other_kg: float
-    """inf: an obstacle, which does not move."""
-    side: str
-
-    @property
-    def own_delta_v_mps(self) -> float:
-        """Change of the player's velocity, if both move on as one."""
-        return self.closing_mps / (1.0 + self.own_kg / self.other_kg)
-
-    @property
-    def other_delta_v_mps(self) -> float:
-        """Change of the other's velocity."""
-        return self.closing_mps / (1.0 + self.other_kg / self.own_kg)
+    closing_mps: float | None = None
+    own_delta_v_mps: float | None = None
+    """Change of the player's velocity, if both move on as one."""
+    other_delta_v_mps: float | None = None
+    side: str | None = None
 
 
-def impact_of(drive: Drive) -> Impact | None:
-    """The contact that ends a drive, with the body that is nearest then; None without one."""
+def impact_of(drive: Drive) -> Impact:
+    """The contact that ends a drive, with the body that is nearest then."""
     game, player, last = drive.game, drive.player, drive.game.last_step(drive.player)
     if drive.outcome is not Outcome.COLLISION or last is None or (other := game.nearest(last, player)) is None:
-        return None
+        return Impact()
     relative = game.velocity_mps(last, other) - game.velocity_mps(last, player)
-    fixed = game.names[other] in game.obstacles
+    closing_mps = float(np.hypot(*relative))
+    own_kg, other_kg = (mass_kg(game.body_kinds[body].vehicle_class) for body in (player, other))
+    if game.names[other] in game.obstacles:
+        other_kg = math.inf
+    angle_rad = contact.impact_angle_rad(game.box(last, player), game.box(last, other), *relative.tolist())
     return Impact(
-        closing_mps=float(np.hypot(*relative)),
-        own_kg=mass_kg(game.body_kinds[player].vehicle_class),
-        other_kg=np.inf if fixed else mass_kg(game.body_kinds[other].vehicle_class),
-        side=side_of(contact.impact_angle_rad(game.box(last, player), game.box(last, other), *relative.tolist())),
+        closing_mps=closing_mps,
+        own_delta_v_mps=closing_mps / (1.0 + own_kg / other_kg),
+        other_delta_v_mps=closing_mps / (1.0 + other_kg / own_kg),
+        side=side_of(angle_rad),
     )
 
 
@@ -70,8 +63,7 @@ def impact_of(drive: Drive) -> Impact | None:
     source="Brach and Brach 2011, Vehicle accident analysis and reconstruction methods: closing velocity",
 )
 def closing_speed_mps(drive: Drive) -> float | None:
-    impact = impact_of(drive)
-    return impact.closing_mps if impact is not None else None
+    return impact_of(drive).closing_mps
 
 
 @metric(
@@ -82,8 +74,7 @@ def closing_speed_mps(drive: Drive) -> float | None:
     source=_SHELBY,
 )
 def ego_delta_v_mps(drive: Drive) -> float | None:
-    impact = impact_of(drive)
-    return impact.own_delta_v_mps if impact is not None else None
+    return impact_of(drive).own_delta_v_mps
 
 
 @metric(
@@ -92,8 +83,7 @@ def ego_delta_v_mps(drive: Drive) -> float | None:
     source=_SHELBY,
 )
 def other_delta_v_mps(drive: Drive) -> float | None:
-    impact = impact_of(drive)
-    return impact.other_delta_v_mps if impact is not None else None
+    return impact_of(drive).other_delta_v_mps
 
 
 @metric(
@@ -103,85 +93,71 @@ def other_delta_v_mps(drive: Drive) -> float | None:
     "the two surfaces that met, within 45 degrees.",
 )
 def impact_side(drive: Drive) -> str | None:
-    impact = impact_of(drive)
-    return impact.side if impact is not None else None
+    return impact_of(drive).side
 
 
 # --- how close it came -----------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Closeness:
-    """How close a drive came to others. Arrays are [N], the steps of the drive."""
-
-    drive: Drive
-
-    @cached_property
-    def ttc_s(self) -> FloatArray:
-        """Time to collision; inf without a course to one."""
-        return self.drive.of("time_to_collision_s")
-
-    @cached_property
-    def headway_s(self) -> FloatArray:
-        """inf without a road user ahead that goes the same way."""
-        q, player, world = self.drive.game.quantities, self.drive.player, self.drive.game.world
-        path = q.on_path
-        turned = q.bodies.heading_rad - q.state.heading_rad[:, player, None]
-        ahead, left = path.ahead_m[:, player], path.left_m[:, player]
-        in_way = np.abs(left) < path.half_width_m[:, player] + 0.5 * world.width_m[player]
-        leads = q.visible[:, player] & in_way & (ahead > 0.0) & (ahead < SIGHT_M)
-        leads &= np.cos(turned) > math.cos(at.LEADER_TURNED_RAD)
-        gap = np.maximum(ahead - path.half_length_m[:, player] - 0.5 * world.length_m[player], 0.0)
-        nearest = np.where(leads, gap, np.inf).min(-1)
-        return np.asarray((nearest / np.maximum(q.state.speed_mps[:, player], 0.1))[self._steps])
-
-    @cached_property
-    def needed_mps2(self) -> FloatArray:
-        """The braking that is needed."""
-        game, player = self.drive.game, self.drive.player
-        actuators, speeds = game.world.actuators, game.bodies.speed_mps[self._steps]
-        friction = float(game.quantities.state.friction[0])
-        most = min(float(actuators.max_braking_mps2[player]), friction * GRAVITY_MPS2)
-        own, others, among = self._boxes
-        own_speed = np.ascontiguousarray(speeds[:, player])
-        return contact.needed_braking_mps2(own, own_speed, others, speeds, among, most, at.NEEDED_WITHIN_S)
-
-    @cached_property
-    def pet_s(self) -> float:
-        """Least post-encroachment time; inf without one."""
-        step_s = self.drive.step_s
-        return float(
-            contact.post_encroachment_s(*self._boxes, at.CROSSING_RAD, step_s, round(at.LONGEST_PET_S / step_s))
-        )
-
-    @cached_property
-    def share(self) -> float:
-        """The least of the measures of closeness, each over its limit; inf without any."""
-        ttc_s, headway_s = (min(each, default=math.inf) for each in (self.ttc_s, self.headway_s))
-        return min(ttc_s / at.CONFLICT_TTC_S, self.pet_s / at.CONFLICT_PET_S, headway_s / at.CONFLICT_HEADWAY_S)
-
-    @cached_property
-    def _steps(self) -> BoolArray:
-        """[T]"""
-        drove = self.drive.game.drove[:, self.drive.player].copy()
-        drove[0] = False
-        return drove
-
-    @cached_property
-    def _boxes(self) -> tuple[Box, Box, BoolArray]:
-        """The player's boxes [N], all bodies' [N, B], and which of those are others that are there [N, B]."""
-        bodies, steps = self.drive.game.bodies, self._steps
-        others = Box(*(getattr(bodies, name)[steps] for name in Box._fields))
-        own = Box(*(np.ascontiguousarray(each[:, self.drive.player]) for each in others))
-        among = bodies.present[steps].copy()
-        among[:, self.drive.player] = False
-        return own, others, among
+@lru_cache(maxsize=1)
+def headways_s(drive: Drive) -> FloatArray:
+    """[N] time headway in each step of the drive; inf without a road user ahead that goes the same way."""
+    q, player, world = drive.game.quantities, drive.player, drive.game.world
+    path = q.on_path
+    turned = q.bodies.heading_rad - q.state.heading_rad[:, player, None]
+    ahead, left = path.ahead_m[:, player], path.left_m[:, player]
+    in_way = np.abs(left) < path.half_width_m[:, player] + 0.5 * world.width_m[player]
+    leads = q.visible[:, player] & in_way & (ahead > 0.0) & (ahead < SIGHT_M)
+    leads &= np.cos(turned) > math.cos(at.LEADER_TURNED_RAD)
+    gap = np.maximum(ahead - path.half_length_m[:, player] - 0.5 * world.length_m[player], 0.0)
+    nearest = np.where(leads, gap, np.inf).min(-1)
+    return np.asarray((nearest / np.maximum(q.state.speed_mps[:, player], 0.1))[_steps(drive)])
 
 
 @lru_cache(maxsize=1)
-def closeness_of(drive: Drive) -> Closeness:
-    """The closeness of a drive: one record for all of its metrics."""
-    return Closeness(drive=drive)
+def needed_mps2(drive: Drive) -> FloatArray:
+    """[N] the braking that is needed in each step of the drive."""
+    game, player = drive.game, drive.player
+    speeds = game.bodies.speed_mps[_steps(drive)]
+    friction = float(game.quantities.state.friction[0])
+    most = min(float(game.world.actuators.max_braking_mps2[player]), friction * GRAVITY_MPS2)
+    own, others, among = _boxes(drive)
+    own_speed = np.ascontiguousarray(speeds[:, player])
+    return contact.needed_braking_mps2(own, own_speed, others, speeds, among, most, at.NEEDED_WITHIN_S)
+
+
+@lru_cache(maxsize=1)
+def least_pet_s(drive: Drive) -> float:
+    """Least post-encroachment time; inf without one."""
+    most = round(at.LONGEST_PET_S / drive.step_s)
+    return float(contact.post_encroachment_s(*_boxes(drive), at.CROSSING_RAD, drive.step_s, most))
+
+
+def least_share(drive: Drive) -> float:
+    """The least of the measures of closeness, each over its limit; inf without any."""
+    ttc_s, headway_s = (min(each, default=math.inf) for each in (_ttc_s(drive), headways_s(drive)))
+    return min(ttc_s / at.CONFLICT_TTC_S, least_pet_s(drive) / at.CONFLICT_PET_S, headway_s / at.CONFLICT_HEADWAY_S)
+
+
+def _ttc_s(drive: Drive) -> FloatArray:
+    return drive.of("time_to_collision_s")
+
+
+def _steps(drive: Drive) -> BoolArray:
+    """[T]"""
+    drove = drive.game.drove[:, drive.player].copy()
+    drove[0] = False
+    return drove
+
+
+def _boxes(drive: Drive) -> tuple[Box, Box, BoolArray]:
+    """The player's boxes [N], all bodies' [N, B], and which of those are others that are there [N, B]."""
+    bodies, steps = drive.game.bodies, _steps(drive)
+    others = Box(*(getattr(bodies, name)[steps] for name in Box._fields))
+    own = Box(*(np.ascontiguousarray(each[:, drive.player]) for each in others))
+    among = bodies.present[steps].copy()
+    among[:, drive.player] = False
+    return own, others, among
 
 
 @metric(
@@ -191,7 +167,7 @@ def closeness_of(drive: Drive) -> Closeness:
     source=f"ISO 34502 and {_CRIME}: THW, with its lanes replaced by the width of the box",
 )
 def min_time_headway_s(drive: Drive) -> float | None:
-    return finite(closeness_of(drive).headway_s, np.min)
+    return finite(headways_s(drive), np.min)
 
 
 @metric(
@@ -202,7 +178,7 @@ def min_time_headway_s(drive: Drive) -> float | None:
     source=f"Allen, Shin and Cooper 1978 ({_CRIME}: PET); angle and limit: FHWA-HRT-08-051",
 )
 def min_post_encroachment_time_s(drive: Drive) -> float | None:
-    return finite(np.array([closeness_of(drive).pet_s]), np.min)
+    return finite(np.array([least_pet_s(drive)]), np.min)
 
 
 @metric(
@@ -214,7 +190,7 @@ def min_post_encroachment_time_s(drive: Drive) -> float | None:
     source=f"Jansson 2005, Collision avoidance theory ({_CRIME}: a_long,req), for boxes at any angle",
 )
 def needed_braking_mps2(drive: Drive) -> float | None:
-    return finite(closeness_of(drive).needed_mps2, np.max)
+    return finite(needed_mps2(drive), np.max)
 
 
 @metric(
@@ -222,7 +198,7 @@ def needed_braking_mps2(drive: Drive) -> float | None:
     meaning="Strongest braking of the ego after braking was needed for the first time; empty if it never was.",
 )
 def used_braking_mps2(drive: Drive) -> float | None:
-    since = np.flatnonzero(closeness_of(drive).needed_mps2 > 0.0)
+    since = np.flatnonzero(needed_mps2(drive) > 0.0)
     return max(0.0, float((-drive.acceleration_mps2)[since[0] :].max())) if len(since) else None
 
 
@@ -232,7 +208,7 @@ def used_braking_mps2(drive: Drive) -> float | None:
     source=f"{_MINDERHOUD} ({_CRIME}: TET)",
 )
 def time_exposed_ttc_s(drive: Drive) -> float:
-    return float(np.count_nonzero(closeness_of(drive).ttc_s <= at.CONFLICT_TTC_S)) * drive.step_s
+    return float(np.count_nonzero(_ttc_s(drive) <= at.CONFLICT_TTC_S)) * drive.step_s
 
 
 @metric(
@@ -242,7 +218,7 @@ def time_exposed_ttc_s(drive: Drive) -> float:
     source=f"{_MINDERHOUD} ({_CRIME}: TIT)",
 )
 def time_integrated_ttc_s2(drive: Drive) -> float:
-    ttc_s = closeness_of(drive).ttc_s
+    ttc_s = _ttc_s(drive)
     return float((at.CONFLICT_TTC_S - ttc_s[ttc_s <= at.CONFLICT_TTC_S]).sum()) * drive.step_s
 
 
@@ -252,7 +228,7 @@ def time_integrated_ttc_s2(drive: Drive) -> float:
     source="UN Regulation No. 157, 5.2.3.3: the shortest time gap",
 )
 def time_headway_below_1_s(drive: Drive) -> float:
-    return float(np.count_nonzero(closeness_of(drive).headway_s < at.SHORT_HEADWAY_S)) * drive.step_s
+    return float(np.count_nonzero(headways_s(drive) < at.SHORT_HEADWAY_S)) * drive.step_s
 
 
 @metric(
@@ -263,7 +239,7 @@ def time_headway_below_1_s(drive: Drive) -> float:
     source="FHWA-HRT-08-051 (TTC); Peesapati, Hunter and Rodgers 2013 (PET); headway: our own",
 )
 def near_miss(drive: Drive) -> int:
-    return int(drive.outcome is not Outcome.COLLISION and closeness_of(drive).share <= 1.0)
+    return int(drive.outcome is not Outcome.COLLISION and least_share(drive) <= 1.0)
 
 
 @metric(
@@ -276,17 +252,12 @@ def near_miss(drive: Drive) -> int:
 def severity(drive: Drive) -> float:
     if drive.outcome is Outcome.COLLISION:
         impact = impact_of(drive)
-        return CONTACT + (min(max(impact.own_delta_v_mps, impact.other_delta_v_mps), _MOST_MPS) if impact else 0.0)
+        return CONTACT + min(max(impact.own_delta_v_mps or 0.0, impact.other_delta_v_mps or 0.0), _MOST_MPS)
     if drive.outcome is Outcome.RAIL:
         speeds_mps = drive.of("speed_mps")
         return RAIL + (min(float(speeds_mps[-1]), _MOST_MPS) if len(speeds_mps) else 0.0)
     timeout = TIMEOUT if drive.outcome is Outcome.TIMEOUT else 0.0
-    return float(closeness(closeness_of(drive).share)) + timeout
-
-
-def closeness(share: Any) -> Any:
-    """From 100 at a share of 0 to 0 at inf: how close a game came, from the least of its measures over their limits."""
-    return 100.0 / (1.0 + share)
+    return 100.0 / (1.0 + least_share(drive)) + timeout
 
 
 def side_of(angle_rad: float) -> str:
