@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from harness.evaluation.metrics import METRICS, Drive
@@ -46,5 +45,5 @@ def collided_with(game: RecordedGame) -> str:
     body = game.nearest(last, EGO) if last is not None and game.outcomes[EGO] is Outcome.COLLISION else None
     if body is None:
         return ""
-    named: Mapping[str, str] = {name: name for name in (*game.world.roles, *game.obstacles)}
-    return named.get(game.names[body], "background")
+    name = game.names[body]
+    return name if name in (*game.world.roles, *game.obstacles) else "background"

@@ -187,19 +187,12 @@ def _pair_name(ego: EgoStrategy | None, non_ego: NonEgoStrategy | None) -> str:
     if ego is None:
         assert non_ego is not None, "an arm has at least one player"
         return f"{strategy_name(non_ego)}_alone"
-    if non_ego is None:
-        match ego:
-            case RetrainedEgo(against=against, round=2):
-                return f"retrained_alone_{against}"
-            case ReconfiguredEgo(against=against):
-                return f"reconfigured_alone_{against}"
-            case _:
-                return f"{strategy_name(ego)}_alone"
-    opponent = strategy_name(non_ego)
+    name = strategy_name(ego)
     match ego:
-        case RetrainedEgo(against=against, round=2) if against == opponent:
-            return f"retrained_vs_{opponent}"
-        case ReconfiguredEgo(against=against) if against == opponent:
-            return f"reconfigured_vs_{opponent}"
-        case _:
-            return f"{strategy_name(ego)}_vs_{opponent}"
+        case RetrainedEgo(against=against, round=2) | ReconfiguredEgo(against=against):
+            made = name.removesuffix(f"_{against}")
+            if non_ego is None:
+                return f"{made}_alone_{against}"
+            if strategy_name(non_ego) == against:
+                return f"{made}_vs_{against}"
+    return f"{name}_alone" if non_ego is None else f"{name}_vs_{strategy_name(non_ego)}"

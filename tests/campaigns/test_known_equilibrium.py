@@ -37,8 +37,13 @@ from harness.drivers.mixture import Member, Mixture
 from harness.drivers.policy import LearnedDriver
 from harness.drivers.policy_file import Policy, write_policy
 from harness.drivers.protocol import Driver
-from harness.evaluation.game_theory.best_response_gap import NOTHING_TO_GAIN, GapVerdict, gaps, nothing_to_gain
-from harness.evaluation.game_theory.records import Response
+from harness.evaluation.game_theory.best_response_gap import (
+    NOTHING_TO_GAIN,
+    GapVerdict,
+    Response,
+    gaps,
+    nothing_to_gain,
+)
 from harness.evaluation.tables import table_of
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.human_factors import HumanFactors

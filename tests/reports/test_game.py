@@ -10,9 +10,8 @@ import pandas as pd
 import pytest
 
 from harness.evaluation.column import POINTS, SHARE
-from harness.evaluation.game_theory.best_response_gap import GapVerdict, gaps
+from harness.evaluation.game_theory.best_response_gap import GapVerdict, Response, gaps
 from harness.evaluation.game_theory.empirical_game import equilibria
-from harness.evaluation.game_theory.records import Response
 from harness.evaluation.tables import columns_of, table_of, write_csv
 from harness.reports.game import CAPTIONS, game_section
 from harness.reports.game_links import GameLinks

@@ -10,8 +10,9 @@ import numpy as np
 import pandas as pd
 
 from harness.evaluation.columns import TABLES
+from harness.evaluation.game_theory.best_response_gap import Response
+from harness.evaluation.game_theory.crossplay import Pairing
 from harness.evaluation.game_theory.findings import find
-from harness.evaluation.game_theory.records import Pairing, Response
 from harness.evaluation.tables import typed
 
 

@@ -79,8 +79,7 @@ def _is_equilibrium(gate: EquilibriumGate, stage: Stage, folder: RunFolder, sign
     import pandas as pd  # slow to import, and few stages have gates
 
     from harness.campaign.storage.arm_tables import arm_tables
-    from harness.evaluation.game_theory.best_response_gap import gaps, nothing_to_gain
-    from harness.evaluation.game_theory.records import Response, Role
+    from harness.evaluation.game_theory.best_response_gap import Response, Role, gaps, nothing_to_gain
 
     episodes = pd.concat([arm_tables(folder, each).episodes for each in gate.stages], ignore_index=True)
     pair, *responses = (str(name) for name in episodes["arm"].unique()[:3])

@@ -9,7 +9,8 @@ from harness.campaign.plan.alone_bounds import alone_bounds
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage
 from harness.config.campaign import Campaign
-from harness.evaluation.game_theory.records import Pairing, Response
+from harness.evaluation.game_theory.best_response_gap import Response
+from harness.evaluation.game_theory.crossplay import Pairing
 from harness.evaluation.strategies import (
     PAPER_ROUNDS,
     Arm,

@@ -26,7 +26,6 @@ pairs and a mean difference, which describe the games, and no test. They are not
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -44,21 +43,11 @@ CONFIDENCE = 0.95
 ROUNDING = 1e-12
 """Differences with a spread below this share of the largest value count as equal: otherwise the rounding of
 0.3 - 0.2 against 0.2 - 0.1 would give a tiny standard deviation and a huge t."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class ComparedMetric:
-    """A compared quantity and its direction: `sign[question] * (treatment - baseline)` is > 0 under H1."""
-
-    name: str
-    column: str
-    sign: Mapping[ResearchQuestion, int]
-
-
-METRICS = (
-    ComparedMetric(name="failure", column="ego_failed", sign={"RQ1": +1, "RQ2": -1}),
-    ComparedMetric(name="mean_speed", column="ego_mean_speed_mps", sign={"RQ1": -1, "RQ2": +1}),
-)
+METRICS: Mapping[str, tuple[str, Mapping[ResearchQuestion, int]]] = {
+    "failure": ("ego_failed", {"RQ1": +1, "RQ2": -1}),
+    "mean_speed": ("ego_mean_speed_mps", {"RQ1": -1, "RQ2": +1}),
+}
+"""The compared quantities: the column of each, and the sign of `treatment - baseline` under H1."""
 
 
 def compare(questions: Iterable[Question], episodes: pd.DataFrame, significance: float) -> pd.DataFrame:
@@ -147,17 +136,14 @@ def rate_cells(name: str, successes: float, games: int) -> dict[str, float]:
     return {name: successes / games if games else np.nan, f"{name}_low": low, f"{name}_high": high}
 
 
-def _row(
-    question: Question, metric: ComparedMetric, games: Mapping[Any, pd.DataFrame], closed: Gate
-) -> dict[str, object]:
-    baseline, treatment, left_out = pairs_of(
-        games, question.seed, question.baseline, question.treatment, [metric.column]
-    )
-    low, high = (baseline, treatment) if metric.sign[question.question] > 0 else (treatment, baseline)
+def _row(question: Question, metric: str, games: Mapping[Any, pd.DataFrame], closed: Gate) -> dict[str, object]:
+    column, sign = METRICS[metric]
+    baseline, treatment, left_out = pairs_of(games, question.seed, question.baseline, question.treatment, [column])
+    low, high = (baseline, treatment) if sign[question.question] > 0 else (treatment, baseline)
     low, high = low[:, 0], high[:, 0]
-    row = vars(question) | vars(closed) | {"metric": metric.name, "pairs": len(low), "pairs_left_out": left_out}
+    row = vars(question) | vars(closed) | {"metric": metric, "pairs": len(low), "pairs_left_out": left_out}
     row |= paired_t_test(low, high, closed)
-    if not closed.reason and metric.name == "failure" and len(low) >= 2:
+    if not closed.reason and metric == "failure" and len(low) >= 2:
         row["mcnemar_p"] = _mcnemar(low, high)
     return row
 

@@ -8,8 +8,9 @@ response may exist, so a gap that is not distinguishable from 0 does not prove a
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from enum import Enum
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -23,8 +24,27 @@ from harness.evaluation.comparisons.comparison import (
     rate_cells,
 )
 from harness.evaluation.competence import gate
-from harness.evaluation.game_theory.records import Response
+from harness.evaluation.research_questions import AloneBound
 from harness.evaluation.tables import table_of, typed
+
+Role = Literal["ego", "non_ego"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Response:
+    """In `response_arm` the player of `role` of the pair in `pair_arm` is replaced by a best response: the best of
+    several trainings against the unchanged other player, chosen by separate games."""
+
+    seed: int
+    role: Role
+    persona: str
+    round: int
+    pair_arm: str
+    response_arm: str
+    ego: str
+    non_ego: str
+    alone: tuple[AloneBound, ...] = ()
+    """What the players of the pair have to achieve alone; otherwise there is no verdict on them."""
 
 
 class GapVerdict(str, Enum):

@@ -9,11 +9,25 @@ import numpy as np
 import pandas as pd
 
 from harness.evaluation.comparisons.comparison import games_by_arm, mean_cells, measured_values, rate_cells
-from harness.evaluation.game_theory.records import Pairing
+from harness.evaluation.research_questions import AloneBound
 from harness.evaluation.tables import table_of
 from harness.game.arrays import FloatArray
 
 MEASURED = ("ego_failed", "ego_payoff", "non_ego_payoff", "ego_mean_speed_mps")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pairing:
+    """One arm as a cell of the cross-play: an ego strategy and a non-ego strategy."""
+
+    arm: str
+    seed: int
+    ego: str
+    non_ego: str
+    persona: str
+    """Of the non-ego; "" for SUMO's own driver, which has no payoff and is in no empirical game."""
+    alone: tuple[AloneBound, ...] = ()
+    """What its players have to achieve alone; otherwise there is no verdict on them."""
 
 
 def crossplay(pairings: Iterable[Pairing], episodes: pd.DataFrame) -> pd.DataFrame:

@@ -9,11 +9,10 @@ import pandas as pd
 
 from harness.evaluation.comparisons.comparison import games_by_arm
 from harness.evaluation.competence import gate
-from harness.evaluation.game_theory.best_response_gap import gaps
-from harness.evaluation.game_theory.crossplay import crossplay
+from harness.evaluation.game_theory.best_response_gap import Response, gaps
+from harness.evaluation.game_theory.crossplay import Pairing, crossplay
 from harness.evaluation.game_theory.empirical_game import equilibria
 from harness.evaluation.game_theory.generalisation import generalisation
-from harness.evaluation.game_theory.records import Pairing, Response
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,7 +15,7 @@ from harness.evaluation.comparisons.comparison import (
     with_verdicts,
 )
 from harness.evaluation.competence import gate
-from harness.evaluation.game_theory.records import Pairing
+from harness.evaluation.game_theory.crossplay import Pairing
 from harness.evaluation.tables import table_of, typed
 
 NAIVE = "naive"

@@ -24,8 +24,7 @@ import numpy as np
 
 from harness.evaluation.rule_book import thresholds as at
 from harness.evaluation.rule_book.course import Course
-from harness.evaluation.rule_book.driving_rules import drifts, swerves
-from harness.evaluation.rule_book.junction_rules import RULES_OF_THE_ROAD
+from harness.evaluation.rule_book.driving_rules import RULES_OF_THE_ROAD, drifts, swerves
 from harness.evaluation.rule_book.lane_entries import WALKS, entries, in_lane, moves_of, words_of
 from harness.game.arrays import BoolArray
 from harness.game.geometry import box_distance
@@ -40,16 +39,16 @@ _SAY_IT_ALL = ("turns_across", "wrong_way")  # of the rules that are broken
 class Cause:
     """Why the ego failed in one game: cells of `causes.csv`."""
 
-    other: str
     event: str
     deed: str
     time_s: float
-    time_left_s: float
-    ego_saw: str
-    hidden_until_s: float
     reaction: str
     braking_mps2: float
-    ego_broke: str
+    other: str = ""
+    time_left_s: float = 0.0
+    ego_saw: str = ""
+    hidden_until_s: float = math.nan
+    ego_broke: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,21 +96,15 @@ def _of_the_ego_alone(course: Course, last: int) -> Cause:
     timeout = course.game.outcomes[EGO] is Outcome.TIMEOUT
     reaction, braking_mps2 = _reaction(course, last, last)
     return Cause(
-        other="",
         event="late" if timeout else "leaves_road",
         deed="the ego does not reach its goal in time" if timeout else "the ego leaves the road with no road user near",
         time_s=round(last * course.step_s, 6),
-        time_left_s=0.0,
-        ego_saw="",
-        hidden_until_s=math.nan,
         reaction=reaction,
         braking_mps2=braking_mps2,
-        ego_broke="",
     )
 
 
 def _subject(course: Course, other: int) -> str:
-    """Words for a road user that is not a person of the game; empty for a person."""
     if other < course.drove.shape[1]:
         return ""
     return "an obstacle: " if course.game.names[other] in course.game.obstacles else "background traffic: "

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from harness.evaluation.rule_book import driving_rules as rules
 from harness.evaluation.rule_book.course import Course, Span
-from harness.evaluation.rule_book.junction_rules import RULES_OF_THE_ROAD
+from harness.evaluation.rule_book.driving_rules import RULES_OF_THE_ROAD
 from harness.evaluation.rule_book.lane_entries import ENTRIES, entries
 
 _RULES: Mapping[str, Callable[[Course, int], Iterator[Span]]] = {
@@ -40,8 +40,17 @@ class Manoeuvre:
 def find_manoeuvres(course: Course) -> list[Manoeuvre]:
     """The manoeuvres of the players in one game, by the time they begin. In a game with an ego they end with the ego's
     game."""
+    digits = 6  # of a second: no rounding error in a multiple of the step
     found = [
-        _named(course, role, name, span)
+        Manoeuvre(
+            player=role,
+            manoeuvre=name,
+            time_s=round(span.first * course.step_s, digits),
+            until_s=round(span.last * course.step_s, digits),
+            gap_m=span.gap_m if math.isfinite(span.gap_m) else math.nan,
+            ttc_s=span.ttc_s if math.isfinite(span.ttc_s) else math.nan,
+            text=span.text,
+        )
         for player, role in enumerate(course.game.world.roles)
         if course.drove[:, player].any()
         for name, span in _spans(course, player)
@@ -60,16 +69,3 @@ def _spans(course: Course, player: int) -> Iterator[tuple[str, Span]]:
                 yield "overtake", replace(span, text=text)
     for name, rule in _RULES.items():
         yield from ((name, span) for span in rule(course, player))
-
-
-def _named(course: Course, role: str, name: str, span: Span) -> Manoeuvre:
-    digits = 6  # of a second: no rounding error in a multiple of the step
-    return Manoeuvre(
-        player=role,
-        manoeuvre=name,
-        time_s=round(span.first * course.step_s, digits),
-        until_s=round(span.last * course.step_s, digits),
-        gap_m=span.gap_m if math.isfinite(span.gap_m) else math.nan,
-        ttc_s=span.ttc_s if math.isfinite(span.ttc_s) else math.nan,
-        text=span.text,
-    )

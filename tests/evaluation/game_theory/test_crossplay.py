@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from harness.evaluation.columns import TABLES
-from harness.evaluation.game_theory.crossplay import crossplay, matrices
-from harness.evaluation.game_theory.records import Pairing
+from harness.evaluation.game_theory.crossplay import Pairing, crossplay, matrices
 from tests.support.game_tables import arm, table
 
 NAIVE = Pairing(arm="naive_vs_speedy", seed=1, ego="naive", non_ego="speedy", persona="speedy")
