@@ -14,18 +14,10 @@ from harness.game.bicycle import ActuatorLimits
 from harness.game.observation_layout import OWN, in_units
 from harness.game.world import World
 
-LARGEST_MPS2, LARGEST_RAD, LARGEST_SCALED = 100.0, 2.0 * math.pi, 100.0
+_LARGEST_MPS2, _LARGEST_RAD, _LARGEST_SCALED = 100.0, 2.0 * math.pi, 100.0
 """Requests beyond these are not those of a driver: tyres transmit about 10 m/s², and wheels turn by less than 1 rad.
 Quantities are exchanged, or a unit is wrong. Scaled actions are -1 to 1, and a network without bounds may exceed
 them."""
-
-
-def check_plausible(requested: FloatArray, largest: float, quantity: str, unit: str) -> None:
-    """Raise DriverError if a request of a driver [N], of `quantity` in `unit`, is beyond ±`largest`."""
-    worst = float(np.max(np.abs(requested), initial=0.0))
-    if largest < worst < math.inf:
-        what = f"it decided {quantity} of {worst:.4g} {unit}"
-        raise DriverError(f"{what}, which is beyond ±{largest:.4g}: is the unit right?")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,14 +43,22 @@ class Car:
 
     def actions(self, acceleration_mps2: FloatArray, steering_rad: FloatArray, observation: FloatArray) -> FloatArray:
         """Actions [N, 2] that request an acceleration [N] and a steering angle [N] at the speed in `observation`
-        [N, SIZE]. A request beyond the car's limits is clipped. Raises DriverError for one beyond `LARGEST_MPS2` or
-        `LARGEST_RAD`."""
-        check_plausible(acceleration_mps2, LARGEST_MPS2, "an acceleration", "m/s²")
-        check_plausible(steering_rad, LARGEST_RAD, "a road wheel angle", "rad")
+        [N, SIZE]. A request beyond the car's limits is clipped. Raises DriverError if a unit or a
+        quantity must be wrong."""
+        _check_plausible(acceleration_mps2, _LARGEST_MPS2, "an acceleration", "m/s²")
+        _check_plausible(steering_rad, _LARGEST_RAD, "a road wheel angle", "rad")
         seen = self.physical(observation)
         speed, road_steering = seen[:, OWN.speed_mps, None], seen[:, OWN.road_steering_rad, None]
         requested, road = (acceleration_mps2[:, None], steering_rad[:, None]), road_steering
         return bicycle.actions(*requested, speed_mps=speed, road_steering_rad=road, actuators=self.actuators)[:, 0]
+
+    def answered(self, answer: FloatArray, observation: FloatArray, *, si: bool) -> FloatArray:
+        """Actions [N, 2] by the answer [N, 2] of a driver: accelerations and steering angles (`si`), or pedals and
+        wheel, which are clipped to -1 to 1. Raises DriverError as `actions`."""
+        if si:
+            return self.actions(answer[:, 0], answer[:, 1], observation)
+        _check_plausible(answer, _LARGEST_SCALED, "pedals or a wheel", "(-1 to 1 is possible)")
+        return np.clip(answer, -1.0, 1.0)
 
 
 def car_of(world: World, player: int) -> Car:
@@ -71,3 +71,11 @@ def car_of(world: World, player: int) -> Car:
         width_m=float(world.width_m[player]),
         actuators=own,
     )
+
+
+def _check_plausible(requested: FloatArray, largest: float, quantity: str, unit: str) -> None:
+    """Raise DriverError if a request of a driver [N], of `quantity` in `unit`, is beyond ±`largest`."""
+    worst = float(np.max(np.abs(requested), initial=0.0))
+    if largest < worst < math.inf:
+        what = f"it decided {quantity} of {worst:.4g} {unit}"
+        raise DriverError(f"{what}, which is beyond ±{largest:.4g}: is the unit right?")

@@ -31,8 +31,8 @@ def files_of(place: Path, document: WithFiles) -> list[Path]:
     named = [*document.named_files.items(), *(("files", each) for each in document.files)]
     for key, file in named:
         if not is_file(folder, file):
-            remedy = nearest(Path(file).name, names_beside(resolve_in(folder, file)))
-            raise UsageError.of(place, key, f"{file!r}: there is no such file", remedy)
+            message = f"{file!r}: there is no such file"
+            raise UsageError.of(place, key, message, nearest_beside(resolve_in(folder, file)))
     found = [resolve_in(folder, file) for _, file in named]
     if isinstance(document, Onnx):  # exporters put large weights into a file beside it
         found += [each for each in (path.with_name(f"{path.name}.data") for path in found) if each.is_file()]
@@ -62,10 +62,10 @@ def is_file(folder: Path, written: str) -> bool:
         return False
 
 
-def names_beside(path: Path) -> list[str]:
-    """The names in a path's folder, as candidates for a remedy."""
+def nearest_beside(path: Path) -> str:
+    """A remedy for a path that leads nowhere: the nearest name in its folder."""
     names = [each.name for each in path.parent.iterdir()] if path.parent.is_dir() else []
-    return names or ["(its folder is empty)"]
+    return nearest(path.name, names or ["(its folder is empty)"])
 
 
 def sha256_of(path: Path) -> str:

@@ -61,18 +61,18 @@ def installed_driver(point: importlib.metadata.EntryPoint, car: Car, parameters:
     try:
         driver = point.load()(car, **parameters)
     except Exception as error:  # a package may raise any exception
-        message = f"{point.name} ({point.value}) can't be made: {type(error).__name__}: {error}"
-        raise DriverError(message) from error
+        what = f"can't be made: {type(error).__name__}: {error}"
+        raise DriverError(f"{point.name} ({point.value}) {what}") from error
     if not isinstance(driver, Driver):
         missing = [name for name in ("takes_over", "reset", "decide") if not hasattr(driver, name)]
-        raise DriverError(
-            f"{point.name} ({point.value}) returned a {type(driver).__name__} without {', '.join(missing)}"
-        )
+        what = f"returned a {type(driver).__name__} without {', '.join(missing)}"
+        raise DriverError(f"{point.name} ({point.value}) {what}")
     return driver
 
 
 def _code(module: str) -> str:
-    """SHA-256 over the files of a module's top-level package, weights included; empty if the package is not found."""
+    """SHA-256 over the files of a module's top-level package, weights included, but not what Python and tools leave
+    beside them; empty if the package is not found."""
     try:
         spec = importlib.util.find_spec(module.partition(".")[0])
     except (ImportError, ValueError):
@@ -81,13 +81,10 @@ def _code(module: str) -> str:
         return ""
     digest = hashlib.sha256()
     for folder in map(Path, spec.submodule_search_locations or ()):
-        for file in sorted(each for each in folder.rglob("*") if _counts(each.relative_to(folder)) and each.is_file()):
-            digest.update(file.relative_to(folder).as_posix().encode() + b"\0" + sha256_of(file).encode())
+        for file in sorted(each for each in folder.rglob("*") if each.is_file()):
+            name = file.relative_to(folder)
+            if not any(part == "__pycache__" or part.startswith(".") for part in name.parts):
+                digest.update(name.as_posix().encode() + b"\0" + sha256_of(file).encode())
     if not spec.submodule_search_locations and spec.has_location and spec.origin:  # else it is part of Python
         digest.update(sha256_of(Path(spec.origin)).encode())
     return digest.hexdigest()
-
-
-def _counts(file: Path) -> bool:
-    """Whether a file is part of a package: not what Python or tools leave beside it."""
-    return not any(part == "__pycache__" or part.startswith(".") for part in file.parts)

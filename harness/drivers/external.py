@@ -41,7 +41,7 @@ from harness.drivers.driver_files import (
     files_of,
     find_program,
     is_file,
-    names_beside,
+    nearest_beside,
     relative_to,
     resolve_in,
     sha256_of,
@@ -186,7 +186,8 @@ def find_driver(written: str, file: Path, key: str, allow_code: bool) -> Externa
 
     Raises UsageError if it is not found or invalid, and if it runs code in files without permission (`allow_code`).
     """
-    place = _place(file, written)
+    installed = installed_names()
+    place = resolve(file, written) if written in installed else find_document(written, file.parent, "egos")
     if os.path.isdir(place):
         read_policy(place)
         return _external(written, place, None, files=policy_files(place))
@@ -194,50 +195,40 @@ def find_driver(written: str, file: Path, key: str, allow_code: bool) -> Externa
         kind = _KIND_OF_SUFFIX.get(place.suffix.lower(), "stable_baselines3")
         remedy = f'; or name a TOML document with kind = "{kind}", file = "{place.name}"'
         check_no_archive(file, key, written, place, remedy=remedy)
-    if not os.path.exists(place):
-        if written.endswith(".toml") or "/" in written:
-            remedy = (
-                nearest(place.name, names_beside(place)) if os.path.isdir(place.parent) else f"no folder {place.parent}"
-            )
-            raise UsageError.of(file, key, f"{written!r}: there is no such file or folder", remedy)
-        names = [LEARNED, SUMO, *installed_names(), *shipped_names("egos")]
-        if written not in names:
-            remedy = nearest(written, names) + "; or name a driver document or the folder of a policy"
-            raise UsageError.of(file, key, f"there is no driver {written!r}", remedy)
-        document: DriverDocument = Python(kind="python", entry_point=written)
-        package = version_of(entry_point(written, file, key))
-        return _external(written, place.parent, document, package=package)
-    document = read_driver(place)
-    if (runs := _RUNS_CODE.get(type(document))) and not allow_code:
-        remedy = f"if you trust it, allow it on the command line: {ALLOW_CODE}"
-        raise UsageError.of(place, "kind", f"this driver {runs}; a document can't give the permission", remedy)
-    return _from_document(written, place, document)
-
-
-def _place(file: Path, written: str) -> Path:
-    """Where a driver would be that a file names: beside the file, or shipped, unless a package provides one."""
-    beside = resolve(file, written)
-    return beside if written in installed_names() else find_document(written, file.parent, "egos")
+    if os.path.exists(place):
+        document = read_driver(place)
+        if (runs := _RUNS_CODE.get(type(document))) and not allow_code:
+            remedy = f"if you trust it, allow it on the command line: {ALLOW_CODE}"
+            raise UsageError.of(place, "kind", f"this driver {runs}; a document can't give the permission", remedy)
+        return _from_document(written, place, document)
+    if written.endswith(".toml") or "/" in written:
+        remedy = nearest_beside(place) if os.path.isdir(place.parent) else f"no folder {place.parent}"
+        raise UsageError.of(file, key, f"{written!r}: there is no such file or folder", remedy)
+    names = [LEARNED, SUMO, *installed, *shipped_names("egos")]
+    if written not in names:
+        remedy = nearest(written, names) + "; or name a driver document or the folder of a policy"
+        raise UsageError.of(file, key, f"there is no driver {written!r}", remedy)
+    package = version_of(entry_point(written, file, key))
+    return _external(written, place.parent, Python(kind="python", entry_point=written), package=package)
 
 
 def _from_document(written: str, place: Path, document: DriverDocument) -> ExternalDriver:
     folder = place.parent
     files = files_of(place, document) if isinstance(document, WithFiles) else []
-    match document:
-        case Process(command=command):
-            runs_in = resolve_in(folder, document.folder)
-            if not runs_in.is_dir():
-                remedy = nearest(runs_in.name, names_beside(runs_in))
-                raise UsageError.of(place, "folder", f"{document.folder!r}: there is no such folder", remedy)
-            program = find_program(command[0], runs_in, place)
-            arguments = [resolve_in(runs_in, each) for each in command[1:] if is_file(runs_in, each)]
-            files = [program, *arguments, *files]
-            return _external(written, folder, document, files=files, command=(str(program), *command[1:]))
-        case Python(entry_point=name):
-            package = version_of(entry_point(name, place, "entry_point"))
-            return _external(written, folder, document, files=files, package=package)
-        case _:
-            return _external(written, folder, document, files=files)
+    command: tuple[str, ...] = ()
+    if isinstance(document, Process):
+        runs_in = resolve_in(folder, document.folder)
+        if not runs_in.is_dir():
+            message = f"{document.folder!r}: there is no such folder"
+            raise UsageError.of(place, "folder", message, nearest_beside(runs_in))
+        program, *arguments = document.command
+        command = (str(find_program(program, runs_in, place)), *arguments)
+        named = [resolve_in(runs_in, each) for each in arguments if is_file(runs_in, each)]
+        files = [Path(command[0]), *named, *files]
+    package = None
+    if isinstance(document, Python):
+        package = version_of(entry_point(document.entry_point, place, "entry_point"))
+    return _external(written, folder, document, files=files, command=command, package=package)
 
 
 def _external(

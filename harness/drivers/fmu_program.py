@@ -15,31 +15,36 @@ import tempfile
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 import fmpy
+from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
 
 from harness.drivers.fmu_variables import entry_as, setter_of
 from harness.drivers.process import PROTOCOL
+from harness.errors import DriverError
 
 _LOG_LINES, _LOG_CHARACTERS = 3, 160
-
 _ONE_GAME = "give the campaign training.games = 1 and reconfiguration.games_at_once = 1"
+_log: deque[str] = deque(maxlen=_LOG_LINES)
+"""The last messages of the FMU's log that are at least warnings."""
 
 
 class _Instance:
     """The FMU's instance for one game."""
 
     def __init__(self, spec: Mapping[str, Any], description: Any, folder: str, game: int) -> None:
-        self._is_fmi2 = str(description.fmiVersion).startswith("2.")
+        version = str(description.fmiVersion)
+        self._is_fmi2 = version.startswith("2.")
+        self.is_only_one = bool(description.coSimulation.canBeInstantiatedOnlyOncePerProcess)
         inputs, self._outputs, start = spec["wiring"][:3]
-        self._step_s, self._steps, self._log = spec["step_s"], 0, deque[str](maxlen=_LOG_LINES)
+        self._step_s, self._steps = spec["step_s"], 0
         self._inputs: dict[str, list[tuple[int, int, str]]] = {}  # by the function that sets them
         for reference, entry, kind in inputs:
-            name = setter_of(str(description.fmiVersion), kind)
-            self._inputs.setdefault(name, []).append((reference, entry, kind))
+            self._inputs.setdefault(setter_of(version, kind), []).append((reference, entry, kind))
         slave = FMU2Slave if self._is_fmi2 else FMU3Slave
         self._fmu = slave(
             guid=description.guid,
@@ -47,19 +52,13 @@ class _Instance:
             modelIdentifier=description.coSimulation.modelIdentifier,
             instanceName=f"game{game}",
         )
-        try:
-            self._begin([(setter_of(str(description.fmiVersion), kind), vr, value) for vr, value, kind in start])
-        except Exception as error:  # FMPy and ctypes may raise any exception
-            raise self._with_log(error) from error
-
-    def _begin(self, start: Sequence[tuple[str, int, Any]]) -> None:
         if self._is_fmi2:
-            self._callbacks = fmi2_callbacks(self._note)
+            self._callbacks = fmi2_callbacks(_note)
             self._fmu.instantiate(callbacks=self._callbacks, loggingOn=True)
         else:
-            self._fmu.instantiate(loggingOn=True, logMessage=self._note)
-        for setter, reference, value in start:
-            getattr(self._fmu, setter)([reference], [value])
+            self._fmu.instantiate(loggingOn=True, logMessage=_note)
+        for reference, value, kind in start:
+            getattr(self._fmu, setter_of(version, kind))([reference], [value])
         if self._is_fmi2:
             self._fmu.setupExperiment(startTime=0.0)
             self._fmu.enterInitializationMode()
@@ -68,19 +67,13 @@ class _Instance:
         self._fmu.exitInitializationMode()
 
     def decide(self, observation: Sequence[float]) -> list[float]:
-        try:
-            return self._decide(observation)
-        except Exception as error:  # FMPy and ctypes may raise any exception
-            raise self._with_log(error) from error
-
-    def _decide(self, observation: Sequence[float]) -> list[float]:
         for setter, inputs in self._inputs.items():
             values = [entry_as(kind, observation[entry]) for _, entry, kind in inputs]
             getattr(self._fmu, setter)([reference for reference, _, _ in inputs], values)
         now_s = self._steps * self._step_s
         result = self._fmu.doStep(currentCommunicationPoint=now_s, communicationStepSize=self._step_s)
         if not self._is_fmi2 and result[1]:
-            raise RuntimeError("the FMU requests the end of the simulation")
+            raise DriverError("the FMU requests the end of the simulation")
         self._steps += 1
         outputs = (self._fmu.getReal if self._is_fmi2 else self._fmu.getFloat64)(self._outputs)
         return [float(value) for value in outputs]
@@ -89,20 +82,12 @@ class _Instance:
         self._fmu.terminate()
         self._fmu.freeInstance()
 
-    def _note(self, environment: Any, *message: Any) -> None:
-        """Keep a message of the FMU's log that is at least a warning. FMI 2.0 tells the instance's name first."""
-        status, _, text = message[-3:]
-        if status:
-            self._log.append(" ".join(text.decode("utf-8", "replace").split())[:_LOG_CHARACTERS] if text else "")
 
-    def _with_log(self, error: Exception) -> Exception:
-        log = f"; its log: {' / '.join(self._log)}" if self._log else ""
-        self._log.clear()
-        return FmuFailed(f"{str(error).rstrip('.')}{log}")
-
-
-class FmuFailed(Exception):
-    """A call of the FMU failed; the message ends with the FMU's own log."""
+def _note(environment: Any, *message: Any) -> None:
+    """Keep a message of the FMU's log. FMI 2.0 tells the instance's name first."""
+    status, _, text = message[-3:]
+    if status:
+        _log.append(" ".join(text.decode("utf-8", "replace").split())[:_LOG_CHARACTERS] if text else "")
 
 
 def fmi2_callbacks(note: Callable[..., None]) -> Any:
@@ -128,14 +113,16 @@ def main() -> None:
     folder = tempfile.mkdtemp(prefix="harness-fmu-")
     try:
         fmpy.extract(spec["file"], unzipdir=folder)
-        description = fmpy.read_model_description(folder)
+        new_instance = partial(_Instance, spec, fmpy.read_model_description(folder), folder)
         instances: dict[int, _Instance] = {}
         for line in sys.stdin:
             try:
-                answer = _answer(json.loads(line), spec, description=description, folder=folder, instances=instances)
+                answer = _answer(json.loads(line), instances, new_instance)
             except Exception as error:  # FMPy and ctypes may raise any exception
-                told = str(error) if isinstance(error, FmuFailed) else f"{type(error).__name__}: {error}"
-                answer = {"error": told}
+                in_words = isinstance(error, DriverError | FMICallException)
+                told = str(error).rstrip(".") if in_words else f"{type(error).__name__}: {error}"
+                answer = {"error": f"{told}; its log: {' / '.join(_log)}" if _log else told}
+                _log.clear()
             answers.write(json.dumps(answer) + "\n")
             answers.flush()
     finally:
@@ -143,12 +130,7 @@ def main() -> None:
 
 
 def _answer(
-    message: Mapping[str, Any],
-    spec: Mapping[str, Any],
-    *,
-    description: Any,
-    folder: str,
-    instances: dict[int, _Instance],
+    message: Mapping[str, Any], instances: dict[int, _Instance], new_instance: Callable[[int], _Instance]
 ) -> dict[str, Any]:
     if message["type"] == "hello":
         return {"protocol": PROTOCOL}
@@ -157,9 +139,9 @@ def _answer(
         for game in games:
             if game in instances:
                 instances.pop(game).close()
-            if instances and description.coSimulation.canBeInstantiatedOnlyOncePerProcess:
-                raise RuntimeError(f"the FMU can play one game at a time only: {_ONE_GAME}")
-            instances[game] = _Instance(spec, description, folder, game)
+            if any(each.is_only_one for each in instances.values()):
+                raise DriverError(f"the FMU can play one game at a time only: {_ONE_GAME}")
+            instances[game] = new_instance(game)
         return {}
     return {"actions": [instances[game].decide(row) for game, row in zip(games, message["observation"], strict=True)]}
 

@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from harness.config.driver import Onnx, TorchScript
-from harness.drivers.car import LARGEST_SCALED, Car, check_plausible
+from harness.drivers.car import Car
 from harness.drivers.policy_file import ACTIONS
 from harness.errors import DriverError, UsageError
 from harness.game.arrays import FloatArray, IntArray
@@ -52,10 +52,7 @@ class NetworkDriver:
         actions = answer.astype(np.float64)
         if not np.isfinite(actions).all():
             raise DriverError(f"{self._file.name} decided numbers that are not finite")
-        if self._si:
-            return self._car.actions(actions[:, 0], actions[:, 1], observation)
-        check_plausible(actions, LARGEST_SCALED, "pedals or a wheel", "(-1 to 1 is possible)")
-        return np.clip(actions, -1.0, 1.0)
+        return self._car.answered(actions, observation, si=self._si)
 
     def _indices(self, answer: Any, games: int) -> IntArray:
         """The index of each game's action: the answer itself, or the place of the largest of its scores."""
@@ -77,11 +74,8 @@ def _onnx(document: Onnx, file: Path) -> Network:
     try:
         import onnxruntime
     except ImportError:
-        message, remedy = (
-            "ONNX files need ONNX Runtime, which is not installed",
-            "pip install 'safedriverl-harness[onnx]'",
-        )
-        raise UsageError.of(file, "", message, remedy) from None
+        message = "ONNX files need ONNX Runtime, which is not installed"
+        raise UsageError.of(file, "", message, "pip install 'safedriverl-harness[onnx]'") from None
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1  # small networks: threads would wait
     options.log_severity_level = 3
@@ -102,11 +96,8 @@ def _onnx(document: Onnx, file: Path) -> Network:
             feed[NOISE] = noise.astype(np.float64 if inputs[NOISE].type == "tensor(double)" else np.float32)
         if not one_by_one:
             return session.run([output], feed)[0]
-        rows = [
-            session.run([output], {name: values[k : k + 1] for name, values in feed.items()})[0]
-            for k in range(len(observation))
-        ]
-        return np.concatenate(rows)
+        games = ({name: values[k : k + 1] for name, values in feed.items()} for k in range(len(observation)))
+        return np.concatenate([session.run([output], each)[0] for each in games])
 
     return run
 
@@ -121,13 +112,11 @@ def _names(document: Onnx, file: Path, inputs: Mapping[str, Any], outputs: list[
         what = f"it has {len(wanted)} inputs beside the noise: {', '.join(wanted)}"[:500]
         raise UsageError.of(file, "input", what, f"export it with one input [games, {SIZE}]; a state is not supported")
     shape, kind = inputs[wanted[0]].shape, inputs[wanted[0]].type
-    if len(shape) != 2 or (isinstance(shape[1], int) and shape[1] != SIZE) or kind not in _FLOATS:
+    floats = ("tensor(float)", "tensor(double)")
+    if len(shape) != 2 or (isinstance(shape[1], int) and shape[1] != SIZE) or kind not in floats:
         what = f"its input {wanted[0]} is {kind} {shape}, not tensor(float) [games, {SIZE}]"
         raise UsageError.of(file, "input", what, "the observation is that of harness/Ego-v0")
     return wanted[0], document.output or outputs[0]
-
-
-_FLOATS = ("tensor(float)", "tensor(double)")
 
 
 def _torchscript(file: Path) -> Network:

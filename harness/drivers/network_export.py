@@ -38,19 +38,20 @@ def export_network(driver: ExternalDriver, out: Path) -> float:
     """
     import torch
 
-    if out.suffix.lower() not in KINDS:
+    ending = out.suffix.lower()
+    if ending not in KINDS:
         raise UsageError.of(out, "", "this ending has no format", f"one of {', '.join(KINDS)}")
     network = _network_of(driver)
     seen = torch.from_numpy(np.random.default_rng(0).uniform(-1.0, 1.0, (_COMPARED, SIZE)).astype(np.float32))
     with torch.no_grad(), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of tracing: the branches of a policy don't depend on the observation
         expected = network(seen).numpy()
-        if out.suffix.lower() == ".onnx":
+        if ending == ".onnx":
             _write_onnx(network, seen[:2], out)
         else:
             torch.jit.trace(network, (seen[:2],)).save(str(out))
-    kind: type[Onnx] | type[TorchScript] = Onnx if out.suffix.lower() == ".onnx" else TorchScript
-    document = kind.model_validate({"kind": KINDS[out.suffix.lower()], "file": out.name})
+    kind: type[Onnx] | type[TorchScript] = Onnx if ending == ".onnx" else TorchScript
+    document = kind.model_validate({"kind": KINDS[ending], "file": out.name})
     decided = np.asarray(read_network(document, out)(seen.numpy(), np.zeros((_COMPARED, ACTIONS))))
     difference = float(np.abs(decided - expected).max())
     if not difference <= TOLERANCE:
@@ -103,7 +104,7 @@ def _of_layers(policy: Policy) -> torch.nn.Module:
 def _of_sb3(driver: ExternalDriver, document: StableBaselines3) -> torch.nn.Module:
     import torch
 
-    from harness.drivers.sb3_file import read_sb3_policy
+    from harness.drivers.sb3_policy import read_sb3_policy
 
     normalize = resolve_in(driver.place, document.normalize) if document.normalize is not None else None
     saved = read_sb3_policy(document, resolve_in(driver.place, document.file), normalize)

@@ -9,8 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -21,7 +20,6 @@ from safetensors.numpy import load as load_tensors
 from safetensors.numpy import save as save_tensors
 
 from harness.config.persona import Persona
-from harness.config.toml_reading import nearest
 from harness.errors import UsageError
 from harness.files import content_of, write_atomically
 from harness.game.arrays import FloatArray
@@ -33,7 +31,6 @@ ACTIONS = 2
 ARCHIVES = (".zip", ".pkl", ".pickle", ".pt", ".pth", ".ckpt", ".joblib", ".npy", ".npz", ".onnx")
 _MAX_TENSOR_BYTES, _MAX_CARD_BYTES = 100_000_000, 1_000_000
 _MAX_PARAMETER = 1e6  # a larger parameter is a sign of damage
-_PARAMETER = re.compile(r"(actor|critic)\.(\d{1,2})\.(weight|bias)", re.ASCII)
 _POLICY_FOLDER = "name the folder of a policy, as under <run>/policies/"
 
 
@@ -57,8 +54,12 @@ class Policy:
 
     def layers(self, part: str) -> list[tuple[FloatArray, FloatArray]]:
         """Weights [out, in] and biases [out] of `actor` or `critic`, in order."""
-        count = sum(name.startswith(f"{part}.") and name.endswith(".weight") for name in self.tensors)
-        return [(self.tensors[f"{part}.{k}.weight"], self.tensors[f"{part}.{k}.bias"]) for k in range(count)]
+        each = range(self.depth(part))
+        return [(self.tensors[f"{part}.{k}.weight"], self.tensors[f"{part}.{k}.bias"]) for k in each]
+
+    def depth(self, part: str) -> int:
+        """The number of layers of `actor` or `critic`."""
+        return sum(name.startswith(f"{part}.") and name.endswith(".weight") for name in self.tensors)
 
 
 def write_policy(policy: Policy, folder: Path) -> None:
@@ -66,10 +67,8 @@ def write_policy(policy: Policy, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     card_file, tensor_file = policy_files(folder)
     card = {"format": FORMAT, "observation": list(LAYOUT), **policy.card}
-    write_atomically(
-        tensor_file,
-        save_tensors({k: np.ascontiguousarray(v) for k, v in policy.tensors.items()}),
-    )
+    tensors = {name: np.ascontiguousarray(tensor) for name, tensor in policy.tensors.items()}
+    write_atomically(tensor_file, save_tensors(tensors))
     write_atomically(card_file, (json.dumps(card, indent=2) + "\n").encode())
 
 
@@ -90,19 +89,14 @@ def read_policy(folder: str | Path) -> Policy:
     >>> read_policy("policies/merge/naive-seed1").card["player"]
     'ego'
     """
-    folder = Path(folder)
-    card = read_card(folder)
+    card_file, tensor_file = policy_files(Path(folder))
+    card = read_card(Path(folder))
     if card["format"] != FORMAT or card["observation"] != list(LAYOUT):
-        raise UsageError.of(
-            policy_files(folder)[0],
-            "observation",
-            "its format or its observation layout is not that of this version",
-            "train it again",
-        )
-    tensor_file = policy_files(folder)[1]
+        message = "its format or its observation layout is not that of this version"
+        raise UsageError.of(card_file, "observation", message, "train it again")
     try:
         policy = Policy(load_tensors(_content(tensor_file, _MAX_TENSOR_BYTES)), card)
-        _check_shapes(policy)
+        _check_tensors(policy)
     except (SafetensorError, ValueError, LookupError, TypeError, AttributeError, OverflowError, MemoryError) as error:
         raise UsageError.of(tensor_file, "", f"is damaged: {error}", "train the policy again") from None
     return policy
@@ -131,8 +125,16 @@ def _content(file: Path, max_bytes: int) -> bytes:
         raise UsageError.of(file, "", str(error.strerror), _POLICY_FOLDER) from None
 
 
-def _check_shapes(policy: Policy) -> None:
-    _check_names(policy.tensors)
+def _check_tensors(policy: Policy) -> None:
+    """Raises ValueError for parameters that are unknown, missing, of another shape, or no plausible numbers."""
+    layers = [f"{part}.{k}" for part in ("actor", "critic") for k in range(policy.depth(part))]
+    expected = {"log_deviation", *(f"{layer}.{kind}" for layer in layers for kind in ("weight", "bias"))}
+    for what, names in (
+        ("there are no parameters", expected - policy.tensors.keys()),
+        ("unknown parameters", policy.tensors.keys() - expected),
+    ):
+        if names:
+            raise ValueError(f"{what} {', '.join(repr(name[:100]) for name in sorted(names)[:5])}")
     for part, outputs in (("actor", ACTIONS), ("critic", 1)):
         width = len(LAYOUT)
         for weight, bias in policy.layers(part):
@@ -152,22 +154,6 @@ def _check_shapes(policy: Policy) -> None:
             raise ValueError(f"{name} has parameters over {_MAX_PARAMETER:g}")
 
 
-def _check_names(names: Iterable[str]) -> None:
-    """Raises ValueError for an unknown parameter and for a missing one."""
-    matches = {name: _PARAMETER.fullmatch(name) for name in names}
-    layers = {(match[1], int(match[2])) for match in matches.values() if match}
-    parts = {
-        part: max((k for layer_part, k in layers if layer_part == part), default=0) for part in ("actor", "critic")
-    }
-    expected = {f"{part}.{k}.{each}" for part, k in layers for each in ("weight", "bias")} | {"log_deviation"}
-    for name, match in matches.items():
-        if match is None and name != "log_deviation":
-            raise ValueError(f"unknown parameters {name[:100]!r}: {nearest(name, expected)}")
-    expected |= {f"{part}.{k}.{each}" for part, n in parts.items() for k in range(n + 1) for each in ("weight", "bias")}
-    if missing := sorted(expected - matches.keys()):
-        raise ValueError(f"there are no parameters {missing[0]!r}")
-
-
 def check_no_archive(file: Path, key: str, written: str, path: Path, *, remedy: str = "") -> None:
     """Raise UsageError if `path`, written as `written` under `key` in `file`, is a file and not a policy's folder.
 
@@ -175,10 +161,7 @@ def check_no_archive(file: Path, key: str, written: str, path: Path, *, remedy: 
     message.
     """
     if path.suffix.lower() in ARCHIVES or os.path.isfile(path):
-        raise UsageError.of(
-            file,
-            key,
-            f"{written!r} is a file: archives such as .zip, .pt and .pkl can carry pickles, which run code when they "
-            "are opened, so the harness does not read them",
-            "a policy is a folder with policy.safetensors and policy.json, as under <run>/policies/" + remedy,
-        )
+        what = "archives such as .zip, .pt and .pkl can carry pickles, which run code when they are opened"
+        message = f"{written!r} is a file: {what}, so the harness does not read them"
+        folder = "a policy is a folder with policy.safetensors and policy.json, as under <run>/policies/"
+        raise UsageError.of(file, key, message, folder + remedy)

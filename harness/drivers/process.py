@@ -14,7 +14,6 @@ the next game starts a new process. The program is killed with its driver and wi
 from __future__ import annotations
 
 import json
-import math
 import os
 import selectors
 import signal
@@ -23,13 +22,14 @@ import sys
 import time
 import weakref
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import MappingProxyType
 from typing import IO, Any
 
 import numpy as np
 
-from harness.drivers.car import LARGEST_SCALED, Car, check_plausible
+from harness.drivers.car import Car
 from harness.errors import DriverError
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.observation_layout import LAYOUT
@@ -99,12 +99,9 @@ class ProcessDriver:
         if isinstance(actions, str):
             raise self._failure(f"answered with invalid actions: {actions}")
         try:
-            if self._si:
-                return self._car.actions(actions[:, 0], actions[:, 1], observation)
-            check_plausible(actions, LARGEST_SCALED, "pedals or a wheel", "(-1 to 1 is possible)")
+            return self._car.answered(actions, observation, si=self._si)
         except DriverError as error:
             raise self._failure(f"gave an implausible answer: {error}") from None
-        return np.clip(actions, -1.0, 1.0)
 
     def close(self) -> None:
         """End the program. A second call does nothing."""
@@ -154,13 +151,13 @@ class _Program:
         except OSError as error:
             raise DriverError(f"{command[0]} can't be started: {error}") from None
         self._kill = weakref.finalize(self, _kill, self._process)
+        self._stdin, self._stdout, self._stderr = _pipes(self._process)
         self._selector = selectors.DefaultSelector()
-        for stream in (self._process.stdin, self._process.stdout, self._process.stderr):
-            assert stream is not None
+        for stream in (self._stdin, self._stdout, self._stderr):
             os.set_blocking(stream.fileno(), False)
-            if stream is not self._process.stdin:
-                self._selector.register(stream, selectors.EVENT_READ)
-        self._stderr = b""
+        self._selector.register(self._stdout, selectors.EVENT_READ)
+        self._selector.register(self._stderr, selectors.EVENT_READ)
+        self._told = b""
 
     @property
     def is_running(self) -> bool:
@@ -168,27 +165,23 @@ class _Program:
 
     def request(self, message: bytes, deadline_s: float) -> bytes:
         """Send a line, and receive one. Raises _NoAnswer if the program does not answer within `deadline_s`."""
-        stdin, stdout, stderr = self._process.stdin, self._process.stdout, self._process.stderr
-        assert stdin is not None
-        assert stdout is not None
-        assert stderr is not None
-        if self._has_output(stdout):
+        if self._stdout in self._ready(0.0):
             raise _NoAnswer("answered before the message was sent" if self.is_running else self._exit_description())
         until, left, answer = time.monotonic() + deadline_s, memoryview(message), bytearray()
-        self._selector.register(stdin, selectors.EVENT_WRITE)
+        self._selector.register(self._stdin, selectors.EVENT_WRITE)
         try:
             while not answer.endswith(b"\n"):
-                ready = [key.fileobj for key, _ in self._selector.select(max(until - time.monotonic(), 0.0))]
+                ready = self._ready(until - time.monotonic())
                 if not ready and time.monotonic() >= until:
                     raise _NoAnswer(f"did not answer within {deadline_s:g} s")
-                if stderr in ready:
+                if self._stderr in ready:
                     self._read_stderr()
-                if stdin in ready:
-                    left = left[os.write(stdin.fileno(), left[:65536]) :]
+                if self._stdin in ready:
+                    left = left[os.write(self._stdin.fileno(), left[:65536]) :]
                     if not left:
-                        self._selector.unregister(stdin)
-                if stdout in ready:
-                    some = os.read(stdout.fileno(), 65536)
+                        self._unregister(self._stdin)
+                if self._stdout in ready:
+                    some = os.read(self._stdout.fileno(), 65536)
                     if not some:
                         raise _NoAnswer(self._exit_description())
                     answer += some
@@ -197,38 +190,36 @@ class _Program:
         except BrokenPipeError:
             raise _NoAnswer(self._exit_description()) from None
         finally:
-            if stdin in [key.fileobj for key in self._selector.get_map().values()]:
-                self._selector.unregister(stdin)
+            self._unregister(self._stdin)
         if left or answer.count(b"\n") > 1:
             raise _NoAnswer("answered before the message was sent" if left else "answered with more than one line")
         return bytes(answer)
 
-    def _has_output(self, stdout: IO[bytes]) -> bool:
-        return any(key.fileobj is stdout for key, _ in self._selector.select(0.0))
+    def _ready(self, within_s: float) -> list[Any]:
+        return [key.fileobj for key, _ in self._selector.select(max(within_s, 0.0))]
+
+    def _unregister(self, stream: IO[bytes]) -> None:
+        if stream in self._selector.get_map():
+            self._selector.unregister(stream)
 
     def stderr_tail(self) -> str:
         """The last lines of its standard error, joined to one line."""
         self._read_stderr()
-        lines = self._stderr.decode("utf-8", "replace").split("\n")
-        return " / ".join(line.strip() for line in lines if line.strip()).strip()[-1000:] if lines else ""
+        lines = (line.strip() for line in self._told.decode("utf-8", "replace").split("\n"))
+        return " / ".join(line for line in lines if line)[-1000:]
 
     def close(self) -> None:
         self._kill()
         self._selector.close()
 
     def _read_stderr(self) -> None:
-        stderr = self._process.stderr
-        assert stderr is not None
         try:
-            while some := os.read(stderr.fileno(), 65536):
-                tail = (self._stderr + some)[-_STDERR_TAIL_BYTES:]
-                self._stderr = b"\n".join(tail.split(b"\n")[-_STDERR_TAIL_LINES - 1 :])
-        except BlockingIOError:
+            while some := os.read(self._stderr.fileno(), 65536):
+                tail = (self._told + some)[-_STDERR_TAIL_BYTES:]
+                self._told = b"\n".join(tail.split(b"\n")[-_STDERR_TAIL_LINES - 1 :])
+            self._unregister(self._stderr)  # closed by the program
+        except (OSError, ValueError):  # nothing to read now, or closed
             return
-        except (OSError, ValueError):
-            return
-        if stderr in [key.fileobj for key in self._selector.get_map().values()]:
-            self._selector.unregister(stderr)  # closed by the program
 
     def _exit_description(self) -> str:
         try:
@@ -238,18 +229,19 @@ class _Program:
         return f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
 
 
+def _pipes(process: subprocess.Popen[bytes]) -> list[IO[bytes]]:
+    return [each for each in (process.stdin, process.stdout, process.stderr) if each is not None]
+
+
 def _kill(process: subprocess.Popen[bytes]) -> None:
     """End a program and its child processes."""
     try:
         os.killpg(process.pid, signal.SIGKILL)
     except (ProcessLookupError, PermissionError):
         process.kill()
-    for pipe in (process.stdin, process.stdout, process.stderr):
-        assert pipe is not None
-        try:
+    for pipe in _pipes(process):
+        with suppress(OSError):
             pipe.close()
-        except OSError:
-            continue
     process.wait()
 
 
@@ -260,12 +252,9 @@ def _actions(answer: Any, games: int) -> FloatArray | str:
     for each in answer:
         if not isinstance(each, list) or len(each) != 2 or not all(type(value) in (int, float) for value in each):
             return f"each must be a pair of numbers, not {_short(each)}"
-        if not all(abs(value) < math.inf for value in each):
-            return f"{_short(each)} is not finite"
-    try:
-        return np.array(answer, dtype=np.float64)
-    except OverflowError:
-        return "a number is too large"
+        if not all(abs(value) <= sys.float_info.max for value in each):
+            return f"{_short(each)} is not finite, or too large"
+    return np.array(answer, dtype=np.float64)
 
 
 def _short(value: Any, longest: int = 200) -> str:

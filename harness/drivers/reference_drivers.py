@@ -21,7 +21,6 @@ import numpy as np
 
 from harness.config.rule_driver import CarefulAndCompetent, Cruise, FuzzySafety, Rss, Rules
 from harness.drivers.car import Car
-from harness.drivers.perception import perceive
 from harness.drivers.protocol import Driver
 from harness.drivers.rules_driver import RulesDriver
 from harness.game.arrays import BoolArray, FloatArray, IntArray
@@ -49,7 +48,7 @@ class ReferenceDriver(Driver, Protocol):
 def reference_driver(name: str, car: Car, lane_width_m: float) -> ReferenceDriver:
     """A reference driver of `REFERENCES` for a car, on a road with lanes of this width."""
     if name == UPPER_BOUND:
-        return StrongestBraking([RulesDriver(reference_rules(each, lane_width_m), car) for each in PERSONS], car)
+        return StrongestBraking(car, [RulesDriver(reference_rules(each, lane_width_m), car) for each in PERSONS])
     return RulesDriver(reference_rules(name, lane_width_m), car)
 
 
@@ -60,10 +59,7 @@ def reference_rules(name: str, lane_width_m: float) -> Rules:
         "fuzzy": FuzzySafety(),
         "rss": Rss(),
     }
-    cruise = Cruise(anticipates_s=0.0)
-    return Rules.model_validate(
-        {"kind": "rules", "name": name, "description": _DESCRIPTION, "cruise": cruise, name: reactions[name]}
-    )
+    return _rules(name).model_copy(update={name: reactions[name]})
 
 
 def reference_identity() -> dict[str, Any]:
@@ -89,8 +85,8 @@ class StrongestBraking:
 
     takes_over = True
 
-    def __init__(self, rules: Sequence[RulesDriver], car: Car) -> None:
-        self._rules, self._car, self._cruising = rules, car, RulesDriver(_cruising(), car)
+    def __init__(self, car: Car, rules: Sequence[RulesDriver]) -> None:
+        self._rules, self._cruising = rules, RulesDriver(_rules("cruising"), car)
 
     def reset(self, games: IntArray) -> None:
         """Reset games [N]: the cruise control requests no acceleration."""
@@ -98,37 +94,25 @@ class StrongestBraking:
 
     def sees_danger(self, observation: FloatArray) -> BoolArray:
         """[N] whether one of the rules says danger."""
-        perceived = perceive(self._car, observation)
-        return np.logical_or.reduce([each.is_danger(*perceived) for each in self._rules])
+        return np.logical_or.reduce([each.sees_danger(observation) for each in self._rules])
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
-        """Actions [N, 2] from observations [N, SIZE]."""
-        return braking_fully(self._cruising.decide(games, observation, noise), self.sees_danger(observation))
+        """Actions [N, 2] from observations [N, SIZE]. The motion clips full braking to what tyres and brakes give."""
+        actions = self._cruising.decide(games, observation, noise)
+        actions[self.sees_danger(observation), 0] = -1.0
+        return actions
 
 
-class FullBraking:
+class FullBraking(StrongestBraking):
     """Keeps its lane and brakes as hard as tyres and brakes allow, until the car stands."""
 
-    takes_over = True
-
     def __init__(self, car: Car) -> None:
-        self._steering = RulesDriver(_cruising(), car)
+        super().__init__(car, [])
 
-    def reset(self, games: IntArray) -> None:
-        """Reset games [N]: nothing is under way."""
-        self._steering.reset(games)
-
-    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
-        """Actions [N, 2] from observations [N, SIZE]."""
-        return braking_fully(self._steering.decide(games, observation, noise), np.ones(len(games), dtype=bool))
+    def sees_danger(self, observation: FloatArray) -> BoolArray:
+        """[N] true: it brakes in every step."""
+        return np.ones(len(observation), dtype=bool)
 
 
-def braking_fully(actions: FloatArray, where: BoolArray) -> FloatArray:
-    """Actions [N, 2] with the brake pedal down where asked [N]; the motion clips it to what tyres and brakes give."""
-    braking = actions.copy()
-    braking[where, 0] = -1.0
-    return braking
-
-
-def _cruising() -> Rules:
-    return Rules(kind="rules", name="cruising", description=_DESCRIPTION, cruise=Cruise(anticipates_s=0.0))
+def _rules(name: str) -> Rules:
+    return Rules(kind="rules", name=name, description=_DESCRIPTION, cruise=Cruise(anticipates_s=0.0))

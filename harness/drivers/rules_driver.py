@@ -7,12 +7,20 @@ continues the request of the step before, because the foot is still on its way t
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from harness.config.rule_driver import LaneKeeping, ReferenceReaction, Rules
+from harness.config.rule_driver import (
+    REACTIONS,
+    CarefulAndCompetent,
+    EmergencyBraking,
+    FuzzySafety,
+    LaneKeeping,
+    Rss,
+    Rules,
+)
 from harness.drivers import emergency_braking
 from harness.drivers.adaptive_cruise import cruise_mps2
 from harness.drivers.car import Car
@@ -21,14 +29,17 @@ from harness.game.arrays import BoolArray, FloatArray, IntArray
 
 CALM_S = 1.0
 """After this time without danger, the next danger needs the full reaction time again."""
+_CRUISING, _REQUESTED, _ROWS = 3, 4, 5
+"""Rows of a driver's state, after those of `ReactionState`: what cruise control and driver requested last, in m/s²."""
+_Law: TypeAlias = EmergencyBraking | CarefulAndCompetent | Rss | FuzzySafety
 
 
 @dataclass(frozen=True, kw_only=True)
 class BrakeReaction:
     """Parameters of a driver's reaction to danger."""
 
-    reaction_s: float
-    jerk_mps3: float
+    reaction_s: float = 0.0
+    jerk_mps3: float = 0.0
     coasting_mps2: float = 0.0
     """Deceleration of the car while its driver reacts."""
 
@@ -87,21 +98,6 @@ def steering_rad(motion: OwnMotion, *, law: LaneKeeping, wheelbase_m: float, ste
     return np.clip(wanted, motion.steering_rad - rate, motion.steering_rad + rate)
 
 
-@dataclass(kw_only=True)
-class _DriverState:
-    """State of every game, [games] each."""
-
-    reacted_s: FloatArray
-    calm_s: FloatArray
-    braking_mps2: FloatArray
-    cruising_mps2: FloatArray
-    requested_mps2: FloatArray
-
-    @classmethod
-    def empty(cls) -> _DriverState:
-        return cls(**{each.name: np.zeros(0) for each in fields(cls)})
-
-
 class RulesDriver:
     """Drives one player's car by a document's rules, in any number of games at once."""
 
@@ -109,91 +105,77 @@ class RulesDriver:
 
     def __init__(self, rules: Rules, car: Car) -> None:
         self._rules, self._car = rules, car
-        self._state = _DriverState.empty()
-        self._reaction = _reaction_parameters(rules)
+        tables: list[_Law | None] = [getattr(rules, name) for name in REACTIONS]
+        self._law = next((table for table in tables if table is not None), None)
+        self._reaction = _reaction_by(self._law)
+        self._state: FloatArray = np.zeros((5, 0))
 
     def reset(self, games: IntArray) -> None:
         """Reset games [N]: no reaction is under way."""
-        state, missing = self._state, int(games.max(initial=-1)) + 1 - len(self._state.reacted_s)
-        for each in fields(state):
-            values = np.pad(getattr(state, each.name), (0, max(missing, 0)))
-            values[games] = 0.0
-            setattr(state, each.name, values)
+        missing = int(games.max(initial=-1)) + 1 - self._state.shape[1]
+        self._state = np.pad(self._state, ((0, 0), (0, max(missing, 0))))
+        self._state[:, games] = 0.0
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
         """Actions [N, 2] from observations [N, SIZE]. Decisions are deterministic: `noise` is not used."""
         state, rules, car = self._state, self._rules, self._car
         motion, encounters = perceive(car, observation)
-        cruising = cruise_mps2(
-            motion,
-            encounters,
-            before_mps2=state.cruising_mps2[games],
-            law=rules.cruise,
-            step_s=car.step_s,
-        )
+        before_mps2 = state[_CRUISING, games]
+        cruising = cruise_mps2(motion, encounters, before_mps2=before_mps2, law=rules.cruise, step_s=car.step_s)
         requested = self._react(games, motion, encounters, cruising)
-        state.cruising_mps2[games], state.requested_mps2[games] = cruising, requested
+        state[_CRUISING, games], state[_REQUESTED, games] = cruising, requested
         wheelbase = float(car.actuators.wheelbase_m[0])
         steering = steering_rad(motion, law=rules.lane_keeping, wheelbase_m=wheelbase, step_s=car.step_s)
         return car.actions(requested, steering, observation)
 
     def sees_danger(self, observation: FloatArray) -> BoolArray:
         """[N] whether the rules say danger for observations [N, SIZE], with no reaction under way."""
-        return self.is_danger(*perceive(self._car, observation))
-
-    def is_danger(self, motion: OwnMotion, encounters: Encounters) -> BoolArray:
-        """[N] whether the rules say danger for what is perceived in N games, with no reaction under way."""
-        count = len(motion.speed_mps)
-        if self._reaction is None:
-            return np.zeros(count, dtype=bool)
-        nothing = ReactionState(*np.zeros((3, count)))
-        return np.any(self._dangers(motion, encounters, nothing)[0], axis=1)
+        motion, encounters = perceive(self._car, observation)
+        dangers, _ = self._dangers(motion, encounters, braking_mps2=np.zeros(len(observation)))
+        return np.any(dangers, axis=1)
 
     def _react(
         self, games: IntArray, motion: OwnMotion, encounters: Encounters, cruising_mps2: FloatArray
     ) -> FloatArray:
         """[N] acceleration to request: that of the cruise control, or the reaction to danger where it is lower."""
-        if self._reaction is None:
-            return cruising_mps2
-        state = self._state
-        reaction = ReactionState(state.reacted_s[games], state.calm_s[games], state.braking_mps2[games])
-        dangers, demands = self._dangers(motion, encounters, reaction)
-        reaction, reacting, braking = react(
-            reaction,
+        before = ReactionState(*self._state[:_CRUISING, games])
+        dangers, demands = self._dangers(motion, encounters, before.braking_mps2)
+        after, reacting, braking = react(
+            before,
             danger=np.any(dangers, axis=1),
             demand_mps2=np.where(dangers, demands, 0.0).max(axis=1),
             parameters=self._reaction,
             step_s=self._car.step_s,
         )
-        for name, values in reaction._asdict().items():
-            getattr(state, name)[games] = values
-        continued = np.minimum(state.requested_mps2[games], -self._reaction.coasting_mps2)
+        self._state[:_CRUISING, games] = after
+        continued = np.minimum(self._state[_REQUESTED, games], -self._reaction.coasting_mps2)
         return np.where(reacting, continued, np.minimum(cruising_mps2, np.where(braking > 0.0, -braking, np.inf)))
 
     def _dangers(
-        self, motion: OwnMotion, encounters: Encounters, reaction: ReactionState
+        self, motion: OwnMotion, encounters: Encounters, braking_mps2: FloatArray
     ) -> tuple[BoolArray, FloatArray]:
-        """[N, K] road users that are a danger, and the braking that each requires."""
-        rules, own = self._rules, motion.speed_mps[:, None]
-        braking = reaction.braking_mps2[:, None]
-        if (law := rules.emergency_braking) is not None:
-            return emergency_braking.emergency(encounters, own, braking=braking > law.warning_braking_mps2, law=law)
-        if (person := rules.careful_and_competent) is not None:
-            return emergency_braking.careful_and_competent(
-                encounters, own, braking=braking > person.coasting_mps2, law=person
-            )
-        if rules.rss is not None:
-            return emergency_braking.rss(encounters, own, rules.rss)
-        assert rules.fuzzy is not None, "reaction parameters come from one of the four tables"
-        return emergency_braking.fuzzy(encounters, own, own_mps2=motion.acceleration_mps2[:, None], law=rules.fuzzy)
+        """[N, K] road users that are a danger, and the braking that each requires; `braking_mps2` is under way."""
+        own, braking = motion.speed_mps[:, None], braking_mps2[:, None]
+        match self._law:
+            case None:
+                return np.zeros_like(encounters.seen), np.zeros(encounters.seen.shape)
+            case EmergencyBraking() as law:
+                return emergency_braking.emergency(encounters, own, braking > law.warning_braking_mps2, law)
+            case CarefulAndCompetent() as law:
+                return emergency_braking.careful_and_competent(encounters, own, braking > law.coasting_mps2, law)
+            case Rss() as law:
+                return emergency_braking.rss(encounters, own, law)
+            case FuzzySafety() as law:
+                return emergency_braking.fuzzy(encounters, own, motion.acceleration_mps2[:, None], law)
 
 
-def _reaction_parameters(rules: Rules) -> BrakeReaction | None:
-    """Parameters of the reaction to danger; None: the driver brakes by its cruise control only."""
-    if rules.emergency_braking is not None:
-        return BrakeReaction(reaction_s=0.0, jerk_mps3=rules.emergency_braking.build_up_mps3)
-    person: ReferenceReaction | None = rules.careful_and_competent or rules.rss or rules.fuzzy
-    if person is None:
-        return None
-    coasting = rules.careful_and_competent.coasting_mps2 if rules.careful_and_competent else 0.0
-    return BrakeReaction(reaction_s=person.reaction_s, jerk_mps3=person.jerk_mps3, coasting_mps2=coasting)
+def _reaction_by(law: _Law | None) -> BrakeReaction:
+    match law:
+        case None:
+            return BrakeReaction()
+        case EmergencyBraking():
+            return BrakeReaction(jerk_mps3=law.build_up_mps3)
+        case CarefulAndCompetent(coasting_mps2=coasting_mps2):
+            return BrakeReaction(reaction_s=law.reaction_s, jerk_mps3=law.jerk_mps3, coasting_mps2=coasting_mps2)
+        case _:
+            return BrakeReaction(reaction_s=law.reaction_s, jerk_mps3=law.jerk_mps3)

@@ -16,7 +16,6 @@ from pettingzoo import ParallelEnv
 
 from harness.drivers.policy_file import ACTIONS
 from harness.environments.arena import LiveSimulation, Seat
-from harness.environments.reset_options import named_game
 from harness.environments.seating import PERSONA, SCENE, Place, opened_scene, read_persona, seating_of
 from harness.environments.single_game import RENDER_MODES, Info, SingleGame
 from harness.errors import UsageError
@@ -113,13 +112,7 @@ class DrivingEnv(LiveSimulation, gymnasium.Env[Any, Any]):
             scene, player, persona=persona, other=other, other_persona=other_persona, allow_code=allow_code
         )
         self._player = seating.learner
-        self._game = SingleGame(
-            seating.scene,
-            seating.seats,
-            human_factors=seating.human_factors,
-            present=seating.present,
-            render_mode=render_mode,
-        )
+        self._game = SingleGame(seating.scene, seating.seats, seating.start_distribution, render_mode)
         self.metadata = {**self.metadata, "render_fps": round(1.0 / seating.scene.world.step_s)}
         self._running = False
         self.render_mode = render_mode
@@ -130,7 +123,7 @@ class DrivingEnv(LiveSimulation, gymnasium.Env[Any, Any]):
         """Reset to the next game that the generator draws, or to the episode that `options` name. Raises UsageError for
         other options."""
         super().reset(seed=seed)
-        self._game.reset(self.np_random, named_game(options))
+        self._game.reset(self.np_random, options)
         self._running = True
         return self._game.observation(self._player), self._game.info(self._player)
 
@@ -201,10 +194,8 @@ class ParallelDrivingEnv(LiveSimulation, ParallelEnv[str, FloatArray, FloatArray
             raise UsageError.of("ParallelDrivingEnv", "non_ego_persona", message, remedy)
         personas = [read_persona(each) for each in (ego_persona, *written)]
         seats = [Seat(None, each.payoff) for each in personas]
-        factors = [each.human_factors for each in personas]
-        self._game = SingleGame(
-            opened, seats, human_factors=factors, present=[1.0] * len(personas), render_mode=render_mode
-        )
+        starts = opened.start_distribution([each.human_factors for each in personas], [1.0] * len(personas))
+        self._game = SingleGame(opened, seats, starts, render_mode)
         self.metadata = {**self.metadata, "render_fps": round(1.0 / opened.world.step_s)}
         self._generator: np.random.Generator | None = None
         self.render_mode = render_mode
@@ -227,7 +218,7 @@ class ParallelDrivingEnv(LiveSimulation, ParallelEnv[str, FloatArray, FloatArray
         """Reset as `DrivingEnv.reset` does. Other options are ignored: PettingZoo's checker passes some."""
         if seed is not None or self._generator is None:
             self._generator, _ = seeding.np_random(seed)
-        self._game.reset(self._generator, named_game(options, others=True))
+        self._game.reset(self._generator, options, ignores_others=True)
         self.agents = list(self._roles)
         return (
             {agent: self._game.observation(player) for player, agent in enumerate(self._roles)},

@@ -12,7 +12,7 @@ from gymnasium.vector.utils import batch_space
 from harness.drivers.policy_file import ACTIONS
 from harness.environments.arena import Arena, LiveSimulation
 from harness.environments.auto_reset import AutoReset
-from harness.environments.seating import PERSONA, SCENE, Place, Seating, seating_of
+from harness.environments.seating import PERSONA, SCENE, Place, seating_of
 from harness.environments.single_game import checked_actions
 from harness.environments.vector_env import ACTION_SPACE, OBSERVATION_SPACE, ArenaVecEnv
 from harness.errors import UsageError
@@ -61,9 +61,9 @@ class VectorDrivingEnv(LiveSimulation, gymnasium.vector.VectorEnv[Any, Any, Any]
     ) -> None:
         """Open the scene and load SUMO with `num_envs` games. The other arguments and errors are those of
         `DrivingEnv`."""
-        seating = _seating(
-            num_envs,
-            seating_of(scene, player, persona=persona, other=other, other_persona=other_persona, allow_code=allow_code),
+        _check_number(num_envs)
+        seating = seating_of(
+            scene, player, persona=persona, other=other, other_persona=other_persona, allow_code=allow_code
         )
         if render_mode is not None:
             remedy = "gymnasium.make draws a single environment"
@@ -157,12 +157,12 @@ def make_vec(
     if interface != "sb3":
         raise UsageError.of("make_vec", "interface", f"is {interface!r}", "one of gymnasium, sb3")
     given = {"scene": SCENE, "player": "ego", "persona": PERSONA, "other": None, "other_persona": None, **arguments}
-    seating = _seating(n, seating_of(**given))
+    _check_number(n)
+    seating = seating_of(**given)
     arena = Arena(seating.scene, n, seating.seats, seed=seed)
     return ArenaVecEnv(arena, seating.learner, seating.start_distribution, _PARTS, seed)
 
 
-def _seating(games: int, seating: Seating) -> Seating:
+def _check_number(games: int) -> None:
     if games < 1:
         raise UsageError.of("make_vec", "n", f"is {games}", "give the number of games, at least 1")
-    return seating

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -28,7 +27,13 @@ class ScenePicture:
     """Draws games of a scene."""
 
     def __init__(self, scene: OpenScene) -> None:
-        self._scene = scene
+        net = read_net(scene.net_file)
+        self._scene, self._surfaces = scene, surfaces(net)
+        self._lines = (  # with colour and width in metres
+            (lane_marks(net), _MARK, 0.15),
+            (scene.rail_lines, _OUTLINE, 0.25),
+            (goal_lines(scene, net), _GOAL, 1.0),
+        )
 
     def draw(self, bodies: Bodies, game: int, player: int) -> Any:
         """The surroundings of a player, uint8 [height, width, 3], in network directions: north is up."""
@@ -44,11 +49,7 @@ class ScenePicture:
         for rings in self._surfaces:
             for ring, colour in zip(rings, (_ROAD, *[_GROUND] * (len(rings) - 1)), strict=True):
                 draw.polygon(pixels(ring), fill=colour)
-        for lines, colour, width_m in (
-            (self._marks, _MARK, 0.15),
-            (self._rails, _OUTLINE, 0.25),
-            (self._goals, _GOAL, 1),
-        ):
+        for lines, colour, width_m in self._lines:
             for line in lines:
                 draw.line(pixels(line), fill=colour, width=round(width_m * scale))
         for body in reversed(range(bodies.x_m.shape[1])):  # the players last: above everything
@@ -61,27 +62,6 @@ class ScenePicture:
         if body < players:
             return _PLAYERS[body]
         return _OBSTACLE if body >= bodies.x_m.shape[1] - obstacles else _BACKGROUND
-
-    @cached_property
-    def _shapes(self) -> tuple[list[list[FloatArray]], list[FloatArray], list[FloatArray]]:
-        net = read_net(self._scene.net_file)
-        return surfaces(net), lane_marks(net), goal_lines(self._scene, net)
-
-    @property
-    def _surfaces(self) -> list[list[FloatArray]]:
-        return self._shapes[0]
-
-    @property
-    def _marks(self) -> list[FloatArray]:
-        return self._shapes[1]
-
-    @property
-    def _goals(self) -> list[FloatArray]:
-        return self._shapes[2]
-
-    @property
-    def _rails(self) -> tuple[FloatArray, ...]:
-        return self._scene.rail_lines
 
 
 def _corners(bodies: Bodies, game: int, body: int) -> FloatArray:

@@ -35,13 +35,10 @@ def seats_of(player: Mixture | None, *, paid: bool) -> tuple[Seat, ...]:
 
 def with_walkers(seats: Sequence[Sequence[Seat]], world: World) -> tuple[tuple[Seat, ...], ...]:
     """The seats [P][n]; in the place of a pedestrian an ordinary walker replaces SUMO, which moves vehicles only."""
-    return tuple(
-        tuple(_on_foot(seat, world, player) for seat in of_player) if world.walks[player] else tuple(of_player)
-        for player, of_player in enumerate(seats)
-    )
 
+    def seated(seat: Seat, player: int) -> Seat:
+        moved_by_sumo = seat.driver is not None and not seat.driver.takes_over
+        on_foot = world.walks[player] and moved_by_sumo
+        return replace(seat, driver=OrdinaryWalker(world, player)) if on_foot else seat
 
-def _on_foot(seat: Seat, world: World, player: int) -> Seat:
-    if seat.driver is None or seat.driver.takes_over:
-        return seat
-    return replace(seat, driver=OrdinaryWalker(world, player))
+    return tuple(tuple(seated(seat, player) for seat in of_player) for player, of_player in enumerate(seats))

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import gymnasium
 import numpy as np
 
+from harness.config.toml_reading import nearest
 from harness.drivers.policy_file import ACTIONS
 from harness.environments.arena import Arena, Seat, Step
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray
-from harness.game.human_factors import HumanFactors
-from harness.game.initial_state import draw_initial_state
+from harness.game.initial_state import StartDistribution, draw_initial_state
 from harness.game.observation import observe
 from harness.game.outcome import Outcome
 from harness.game.roles import EGO
-from harness.game.seeding import generator_of
+from harness.game.seeding import generator_of, parts_of
 from harness.game.state import Bodies
 from harness.road.scene.open_scene import OpenScene
 
@@ -25,9 +25,8 @@ if TYPE_CHECKING:
     from harness.environments.scene_picture import ScenePicture, Window
 
 Info: TypeAlias = dict[str, Any]
-
-
 RENDER_MODES = ("rgb_array", "human")
+_OPTIONS = ("episode", "campaign_seed")  # of `reset`
 
 
 class SingleGame:
@@ -37,29 +36,27 @@ class SingleGame:
         self,
         scene: OpenScene,
         seats: Sequence[Seat],
-        *,
-        human_factors: Sequence[HumanFactors],
-        present: Sequence[float],
-        render_mode: str | None = None,
+        start_distribution: StartDistribution,
+        render_mode: str | None,
     ) -> None:
-        """Load SUMO. `present` [P] are the shares of games in which players take part.
-
-        Raises UsageError if there is no such render mode, SimulationError if SUMO can't load the scene.
-        """
+        """Load SUMO. Raises UsageError if there is no such render mode, SimulationError if SUMO can't load the
+        scene."""
         if render_mode not in (None, *RENDER_MODES):
-            raise UsageError.of(
-                "environment", "render_mode", f"is {render_mode!r}", f"one of {', '.join(RENDER_MODES)}"
-            )
-        self._scene, self._render_mode = scene, render_mode
+            remedy = f"one of {', '.join(RENDER_MODES)}"
+            raise UsageError.of("environment", "render_mode", f"is {render_mode!r}", remedy)
+        self._scene, self._start_distribution, self._render_mode = scene, start_distribution, render_mode
         self._picture: ScenePicture | None = None
         self._window: Window | None = None
         self._bodies: Bodies | None = None
-        self._start_distribution = self._scene.start_distribution(human_factors, present)
-        self.arena = Arena(self._scene, 1, seats)
+        self.arena = Arena(scene, 1, seats)
 
-    def reset(self, generator: np.random.Generator, parts: tuple[str | int, ...] | None = None) -> None:
-        """Reset to the game with the seeds of `parts`, or to the next one that the generator draws."""
-        parts = parts or ("environment", int(generator.integers(2**63 - 1)))
+    def reset(
+        self, generator: np.random.Generator, options: Mapping[str, Any] | None, *, ignores_others: bool = False
+    ) -> None:
+        """Reset to the episode that `options` name, or to the next game that the generator draws. Raises UsageError for
+        wrong options, and for others unless it ignores them."""
+        options = {key: value for key, value in (options or {}).items() if key in _OPTIONS or not ignores_others}
+        parts = _named_game(options) if options else ("environment", int(generator.integers(2**63 - 1)))
         start = draw_initial_state(self._start_distribution, *parts)
         self.arena.reload(start.seed)
         self.arena.reset({0: start}, {0: self._scene.departures(generator_of(*parts, "others"))})
@@ -128,9 +125,9 @@ class SingleGame:
         station_m = float(state.station_m[0, player])
         payoff = self.arena.seats[player][0].payoff
         outcome, terms = int(state.outcome[0, player]), dict[str, float]()
-        if payoff is not None:
+        if payoff is not None and step is None:
             terms = dict.fromkeys((*(each.name for each in payoff.terms), *payoff.fuzzy), 0.0)
-        if payoff is not None and step is not None:
+        elif payoff is not None and step is not None:
             terms = {name: float(share[0]) + 0.0 for name, share in payoff.evaluate(step.quantities, player).items()}
         return {
             "outcome": outcome,
@@ -141,6 +138,19 @@ class SingleGame:
             "speed_mps": float(state.speed_mps[0, player]),
             "time_s": float(state.step[0]) * self.arena.world.step_s,
         }
+
+
+def _named_game(options: Mapping[str, Any]) -> tuple[str | int, ...]:
+    """The parts of the seeds of the game that `options` name: {"episode": 3} is episode 3 of every arm of a campaign
+    with the seed 1; `campaign_seed` names another seed."""
+    for key, value in options.items():
+        if key not in _OPTIONS:
+            raise UsageError.of("reset", f"options[{key!r}]", "is no option", nearest(str(key), _OPTIONS))
+        if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+            raise UsageError.of("reset", f"options[{key!r}]", f"is {value!r}", "give a whole number from 0 on")
+    if "episode" not in options:
+        raise UsageError.of("reset", "options['episode']", "is missing", "name the episode of the campaign's seed")
+    return parts_of(options.get("campaign_seed", 1), options["episode"])
 
 
 def checked_actions(actions: Any, shape: tuple[int, ...]) -> FloatArray:

@@ -33,7 +33,7 @@ from harness.assessment.rollout import SeatedArm, assess
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.car import car_of
-from harness.drivers.mixture import Member, Mixture
+from harness.drivers.mixture import Member, Mixture, mixture_of
 from harness.drivers.policy import LearnedDriver
 from harness.drivers.policy_file import Policy, write_policy
 from harness.drivers.protocol import Driver
@@ -392,7 +392,8 @@ class Coin:
             ego="coin",
             non_ego="coin",
         )
-        episodes = pd.concat([self.games("pair", self.player), self.games("response", response)], ignore_index=True)
+        answer = mixture_of(response, self.personas[EGO])
+        episodes = pd.concat([self.games("pair", self.player), self.games("response", answer)], ignore_index=True)
         (row,) = gaps([asked], episodes, 0.01).iloc
         return row
 

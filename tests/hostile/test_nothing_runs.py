@@ -33,7 +33,7 @@ EXCEPTIONS = {
     # its stream is a pipe to a child that it started itself: no file, no address, nobody else's
     "harness/sumo/subprocess_simulation.py": {"pickle"},
     # VecNormalize saves pickles: read with the permission to run code alone (--allow-code)
-    "harness/drivers/sb3_file.py": {"pickle"},
+    "harness/drivers/sb3_policy.py": {"pickle"},
     # its stream is a pipe to a child that it started itself
     "harness/assessment/repeated_game.py": {"pickle"},
     # hands on what Python itself found, when Gymnasium is imported
