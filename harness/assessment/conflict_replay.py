@@ -28,7 +28,6 @@ from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.observation import observe
 from harness.game.outcome import Outcome
 from harness.game.roles import EGO
-from harness.game.sanity_checks import slack_m
 from harness.game.seeding import parts_of
 from harness.road.scene.open_scene import OpenScene
 
@@ -95,10 +94,9 @@ class ConflictReplay:
         games = np.repeat(np.arange(len(grids)), [len(grid) for grid in grids])
         steps = np.concatenate([np.array(grid, dtype=np.int64) for grid in grids])
         avoids = self._prevented(games, steps, lambda: FullBraking(self._car))
-        good = [steps[(games == game) & avoids] for game in range(len(grids))]
-        found = np.array([game for game, each in enumerate(good) if len(each)], dtype=np.int64)
-        first = np.array([good[game].min() for game in found], dtype=np.int64)
-        last = np.array([good[game].max() for game in found], dtype=np.int64)
+        found = np.unique(games[avoids])
+        good = [steps[(games == game) & avoids] for game in found]
+        first, last = (np.array([end(each) for each in good], dtype=np.int64) for end in (np.min, np.max))
         ends = np.array([self._collisions[game].course.failed_step for game in found], dtype=np.int64)
         first_steps = self._boundary(found, good=first, bad=np.maximum(first - spacing, -1))
         last_steps = self._boundary(found, good=last, bad=np.minimum(last + spacing, ends))
@@ -135,8 +133,7 @@ class ConflictReplay:
     def _observed(self) -> FloatArray:
         """[T, N, SIZE] what the ego sees of its opponent in each step of each collision; T is that of the longest."""
         replays = [CourseReplay(course=each.course, only_opponent=True) for each in self._collisions]
-        arena = self._arena(replays, [SumoDriver()] * len(self._scene.world.roles))
-        arena.take_over([self._start(game, replay) for game, replay in enumerate(replays)], replays)
+        arena = self._taken_over(range(len(replays)), replays, [SumoDriver()] * len(self._scene.world.roles))
         observations = [arena.observation[:, EGO].copy()]
         for _ in range(max(each.course.failed_step for each in self._collisions)):
             arena.step()
@@ -157,9 +154,7 @@ class ConflictReplay:
             for game, step in zip(games.tolist(), steps.tolist(), strict=True)
         ]
         people = len(self._scene.world.roles) - 1
-        arena = self._arena(replays, [driver, *[SumoDriver()] * people])
-        starts = [self._start(game, replay) for game, replay in zip(games.tolist(), replays, strict=True)]
-        arena.take_over(starts, replays)
+        arena = self._taken_over(games.tolist(), replays, [driver, *[SumoDriver()] * people])
         lengths = np.array([len(each.course.players) - 1 - each.first_step for each in replays])
         prevented = np.ones(len(replays), dtype=bool)
         for step in range(1, int(lengths.max()) + 1):
@@ -168,9 +163,19 @@ class ConflictReplay:
             prevented &= ~(failed & (step <= lengths))
         return prevented
 
-    def _arena(self, replays: Sequence[CourseReplay], drivers: Sequence[Driver]) -> _Replayed:
+    def _taken_over(self, games: Sequence[int], replays: Sequence[CourseReplay], drivers: Sequence[Driver]) -> Arena:
+        """An arena at the first step of each replay of the collisions `games` [N], with the ego's recorded acceleration
+        and steering. Seats of SUMO repeat the recording, also those of pedestrians."""
         simulation = RecordedCourses(replays, [each.takes_over for each in drivers])
-        return _Replayed(self._scene, [Seat(each) for each in drivers], simulation, len(replays))
+        arena = Arena(self._scene, len(replays), [Seat(each) for each in drivers], simulation=simulation)
+        arena.reset(
+            {row: self._start(game, replay) for row, (game, replay) in enumerate(zip(games, replays, strict=True))}
+        )
+        for row, each in enumerate(replays):
+            arena.state.acceleration_mps2[row, EGO] = each.course.ego_acceleration_mps2[each.first_step]
+            arena.state.steering_rad[row, EGO] = each.course.ego_steering_rad[each.first_step]
+        arena.observation[:] = observe(arena.first_quantities(np.arange(len(replays))))
+        return arena
 
     def _start(self, game: int, replay: CourseReplay) -> InitialState:
         """The state in which a replay begins; its road is as slippery as in the recorded game."""
@@ -178,22 +183,3 @@ class ConflictReplay:
         distribution = self._scene.start_distribution([HumanFactors()] * len(present), present)
         drawn = draw_initial_state(distribution, *parts_of(self._seed, self._collisions[game].episode))
         return start_of(replay, drawn)
-
-
-class _Replayed(Arena):
-    """An arena whose games begin in the middle of a drive. Seats of SUMO repeat a recording, also of pedestrians."""
-
-    def __init__(self, scene: OpenScene, seats: Sequence[Seat], simulation: RecordedCourses, games: int) -> None:
-        super().__init__(scene, games, seats, simulation=simulation)
-        self.seats = tuple((each,) for each in seats)
-        self._taken_over = np.array([each.driver is not None and each.driver.takes_over for each in seats])
-        self._on_wheels = self._taken_over & ~self.world.walks
-        self._slack_m = slack_m(self._taken_over)
-
-    def take_over(self, starts: Sequence[InitialState], replays: Sequence[CourseReplay]) -> None:
-        """Reset every game to its start, with the ego's recorded acceleration and steering, and observe."""
-        self.reset(dict(enumerate(starts)))
-        for game, each in enumerate(replays):
-            self.state.acceleration_mps2[game, EGO] = each.course.ego_acceleration_mps2[each.first_step]
-            self.state.steering_rad[game, EGO] = each.course.ego_steering_rad[each.first_step]
-        self.observation[:] = observe(self._first_quantities(self._all_games))

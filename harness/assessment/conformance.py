@@ -17,6 +17,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,8 +41,7 @@ TOLERANCE = 1e-5
 """Largest difference between the actions of one game alone and among others: the order of summation differs."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Decision:
+class Decision(NamedTuple):
     """One decision of a driver in a game: observation [SIZE], noise [2], action [2]."""
 
     observation: FloatArray
@@ -49,8 +49,7 @@ class Decision:
     action: FloatArray
 
 
-@dataclass(kw_only=True)
-class _PlayedGame:
+class _PlayedGame(NamedTuple):
     """The ego's decisions in one game, and its motion: x, y, heading and speed after each step, [T, 4]."""
 
     decisions: list[Decision]
@@ -115,8 +114,7 @@ class _CheckedDriver:
         if not (np.array_equal(observation_argument, observation) and np.array_equal(noise_argument, noise)):
             raise _Violation("it modified the observation or the noise it was given: work on a copy")
         actions = _checked(result, len(games))
-        rows = zip(observation.copy(), noise.copy(), actions, strict=True)
-        self.decisions += [Decision(observation=seen, noise=drawn, action=action) for seen, drawn, action in rows]
+        self.decisions += map(Decision, observation.copy(), noise.copy(), actions)
         return actions
 
 
@@ -145,9 +143,8 @@ def check_named(written: str, scene: Path, games: int, *, allow_code: bool) -> F
     """
     if written == LEARNED:
         message = f"{LEARNED!r} is trained by a campaign: before the training there is no driver to check"
-        raise UsageError.of(
-            "DRIVER", "", message, "name the folder of a trained policy, such as RUN/policies/naive-seed1"
-        )
+        remedy = "name the folder of a trained policy, such as RUN/policies/naive-seed1"
+        raise UsageError.of("DRIVER", "", message, remedy)
     external = None if written == SUMO else find_driver(written, Path("DRIVER"), key="", allow_code=allow_code)
     folder = scene if scene.exists() else _CHECKOUT / scene
     opened = open_scene(folder, external.vehicle_type if external else None)
@@ -171,11 +168,8 @@ def check_conformance(driver: Driver, scene: OpenScene, games: int) -> Findings:
     try:
         first = _play(driver, scene, games, findings=findings, activity="playing")
         again = _play(driver, scene, games, findings=findings, activity="playing the same games again")
-        if not driver.takes_over:
-            _check_motion(first, again, findings)
-            return findings
-        _check_determinism(first, again, findings)
-        if not findings.violations:
+        _check_determinism(driver, first, again, findings)
+        if driver.takes_over and not findings.violations:
             _check_independence(driver, [game.decisions for game in first], findings)
     except _Violation as error:
         findings.violations.append(str(error))
@@ -187,8 +181,8 @@ def difference_of(driver: Driver, scene: OpenScene) -> str:
     can't be played. Raises SimulationError if SUMO fails."""
     findings = Findings()
     try:
-        first = _play(driver, scene, 1, findings=findings, activity="playing")
-        _check_determinism(first, _play(driver, scene, 1, findings=findings, activity="playing again"), findings)
+        first, again = (_play(driver, scene, 1, findings=findings, activity="playing") for _ in range(2))
+        _check_determinism(driver, first, again, findings)
     except _Violation:
         return ""
     return "".join(findings.violations)
@@ -210,17 +204,14 @@ def _play(driver: Driver, scene: OpenScene, games: int, *, findings: Findings, a
                 arena.reset({0: start}, {0: scene.departures(generator_of(*parts, "others"))})
                 while arena.state.running[0, EGO]:
                     state = arena.step().quantities.state
-                    motion.append(
-                        np.array(
-                            [values[0, EGO] for values in (state.x_m, state.y_m, state.heading_rad, state.speed_mps)]
-                        )
-                    )
+                    pose = (state.x_m, state.y_m, state.heading_rad, state.speed_mps)
+                    motion.append(np.array([values[0, EGO] for values in pose]))
             except (SimulationError, _Violation, MemoryError):
                 raise
             except Exception as error:  # a driver may raise any exception
                 where = f"{activity}, game {game}, decision {len(checked.decisions)}"
                 raise _Violation(f"{where}: it raised {type(error).__name__}: {error}") from error
-            played.append(_PlayedGame(decisions=checked.decisions, motion=np.array(motion).reshape(-1, 4)))
+            played.append(_PlayedGame(checked.decisions, np.array(motion).reshape(-1, 4)))
             outcomes.append(Outcome(int(arena.state.outcome[0, EGO])).word)
     finally:
         arena.close()
@@ -228,29 +219,32 @@ def _play(driver: Driver, scene: OpenScene, games: int, *, findings: Findings, a
     return played
 
 
-def _check_motion(first: Sequence[_PlayedGame], again: Sequence[_PlayedGame], findings: Findings) -> None:
-    steps = sum(len(game.motion) for game in first)
-    findings.passed.append(f"{steps} steps: SUMO's own models move the ego, so there are no actions to check")
+def _check_determinism(
+    driver: Driver, first: Sequence[_PlayedGame], again: Sequence[_PlayedGame], findings: Findings
+) -> None:
+    what = "actions" if driver.takes_over else "motion"
+    if driver.takes_over:
+        count = sum(len(game.decisions) for game in first)
+        findings.passed.append(f"{count} decisions: [N, 2] finite numbers from -1 to 1")
+    else:
+        count = sum(len(game.motion) for game in first)
+        findings.passed.append(f"{count} steps: SUMO's own models move the ego, so there are no actions to check")
     for number, (one, other) in enumerate(zip(first, again, strict=True)):
-        if not np.array_equal(one.motion, other.motion):
-            findings.violations.append(f"it is not deterministic: game {number}, played again, had another motion")
-            return
-    findings.passed.append("the same games again: the same motion, bit for bit")
-
-
-def _check_determinism(first: Sequence[_PlayedGame], again: Sequence[_PlayedGame], findings: Findings) -> None:
-    decisions = sum(len(game.decisions) for game in first)
-    findings.passed.append(f"{decisions} decisions: [N, 2] finite numbers from -1 to 1")
-    for game, (one, other) in enumerate(zip(first, again, strict=True)):
         for step, (before, now) in enumerate(zip(one.decisions, other.decisions, strict=False)):
             if not np.array_equal(before.action, now.action):
+                where, actions = f"decision {step} of game {number}", (before.action.tolist(), now.action.tolist())
                 findings.violations.append(
-                    f"it is not deterministic: in decision {step} of game {game} it decided {before.action.tolist()}, "
-                    f"and {now.action.tolist()} when the same game was played again; reset must discard the state of "
-                    "the game, and random numbers must come from the noise argument"
+                    f"it is not deterministic: in {where} it decided {actions[0]}, and {actions[1]} when the same game "
+                    "was played again; reset must discard the state of the game, and random numbers must come from "
+                    "the noise argument"
                 )
                 return
-    findings.passed.append("the same games again: the same actions, bit for bit")
+        if not driver.takes_over and not np.array_equal(one.motion, other.motion):
+            findings.violations.append(f"it is not deterministic: game {number}, played again, had another motion")
+            return
+    findings.passed.append(
+        f"the same games again: the same {'actions' if driver.takes_over else 'motion'}, bit for bit"
+    )
 
 
 def _check_independence(driver: Driver, played: Sequence[Sequence[Decision]], findings: Findings) -> None:

@@ -28,6 +28,7 @@ from harness.road.scene.open_scene import OpenScene
 from harness.sumo.simulation import AtReset, Reading
 
 _POSE = ("x_m", "y_m", "heading_rad", "speed_mps")
+_TOUCHING_M = 0.01  # coordinates in a trace are exact; the margin covers the rounding of rotated boxes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,15 +110,10 @@ def _along_routes(quantities: Quantities, steps: int) -> FloatArray:
     station = state.station_m[-1] + speed * world.step_s * np.arange(1, steps + 1)[:, None]
     row = routes.rows(station)
     heading = routes.heading_rad[row]
-    beyond = station - _stations_of(routes, row)
+    beyond = station - ((row - routes.first_row) * SPACING_M - MARGIN_M)  # of the row's own station
     x = routes.x_m[row] - offset * np.sin(heading) + beyond * np.cos(heading)
     y = routes.y_m[row] + offset * np.cos(heading) + beyond * np.sin(heading)
     return np.stack((x, y, heading, np.broadcast_to(speed, station.shape)), axis=-1)
-
-
-def _stations_of(routes: Routes, row: IntArray) -> FloatArray:
-    """[steps, P] the stations of rows of the players' routes."""
-    return (row - routes.first_row) * SPACING_M - MARGIN_M
 
 
 def _touched(game: RecordedGame) -> int:
@@ -126,9 +122,6 @@ def _touched(game: RecordedGame) -> int:
     nearest = game.nearest(last, EGO)
     touches = nearest is not None and box_distance(game.box(last, EGO), game.box(last, nearest)) <= _TOUCHING_M
     return nearest if nearest is not None and touches else -1
-
-
-_TOUCHING_M = 0.01  # coordinates in a trace are exact; the margin covers the rounding of rotated boxes
 
 
 @dataclass(frozen=True, kw_only=True)

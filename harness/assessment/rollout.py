@@ -125,19 +125,19 @@ def _play(
         present = arena.state.present[0].copy()
         trace.add_players(present, arena.step())
         trace.add_others()
-    outcomes = zip(arena.state.outcome[0].tolist(), arm.present_in(episode), strict=True)
-    words = [Outcome(outcome).word if there else "" for outcome, there in outcomes]
-    return Game(played=_played(arm, episode, words), trace=trace.columns, scene=arm.scene)
+    played = _played(arm, episode, [Outcome(outcome) for outcome in arena.state.outcome[0].tolist()], "")
+    return Game(played=played, trace=trace.columns, scene=arm.scene)
 
 
 def _failed(arm: SeatedArm, episode: int, error: str) -> Game:
-    words = [Outcome.ERROR.word if there else "" for there in arm.present_in(episode)]
-    return Game(played=_played(arm, episode, words, error), trace=None, scene=arm.scene)
+    played = _played(arm, episode, [Outcome.ERROR] * len(arm.drivers), error)
+    return Game(played=played, trace=None, scene=arm.scene)
 
 
-def _played(arm: SeatedArm, episode: int, outcomes: Sequence[str], error: str = "") -> dict[str, Any]:
-    named = zip(arm.scene.world.roles, outcomes, strict=True)
-    return {"episode": episode, **{f"{role}_outcome": outcome for role, outcome in named}, "error": error}
+def _played(arm: SeatedArm, episode: int, outcomes: Sequence[Outcome], error: str) -> dict[str, Any]:
+    named = zip(arm.scene.world.roles, outcomes, arm.present_in(episode), strict=True)
+    words = {f"{role}_outcome": outcome.word if there else "" for role, outcome, there in named}
+    return {"episode": episode, **words, "error": error}
 
 
 class _Trace:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import repeat
-from types import TracebackType
 
 import numpy as np
 
@@ -43,30 +42,20 @@ class StartTrials:
     def __init__(self, arm: SeatedArm, episode: int) -> None:
         self._arm = arm
         self._next: FloatArray | None = None
+        self.last_start: FloatArray = np.empty(0)
+        """[2 P] the start of the game that was played last."""
         self._games: Iterator[Game] = assess(arm, repeat(episode), start_from=self._start)
 
-    def play(self, start: FloatArray) -> Game:
-        """Play the episode from a start [2 P]: the players' positions, then their speeds. Raises SimulationError if
-        SUMO can't load the scene."""
+    def play(self, start: FloatArray | None) -> Game:
+        """Play the episode from a start [2 P]: the players' positions, then their speeds; None: from the one that is
+        drawn for it. Raises SimulationError if SUMO can't load the scene."""
         self._next = start
         return next(self._games)
-
-    def drawn(self) -> Game:
-        """Play the episode from the start that is drawn for it."""
-        self._next = None
-        return next(self._games)
-
-    @property
-    def last_start(self) -> FloatArray:
-        """[2 P] the start of the game that was played last."""
-        return self._last
 
     def __enter__(self) -> StartTrials:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self._games.close()  # type: ignore[attr-defined]
 
     def _start(self, drawn: InitialState) -> InitialState:
@@ -74,5 +63,5 @@ class StartTrials:
         if self._next is not None:
             position_m, speed_mps = np.split(self._next, 2)
             start = start_at(self._arm.scene, drawn, position_m.tolist(), speed_mps.tolist())
-        self._last = np.concatenate((start.position_m, start.speed_mps))
+        self.last_start = np.concatenate((start.position_m, start.speed_mps))
         return start

@@ -19,7 +19,7 @@ The random numbers of a game are drawn when it is reset (`game.initial_state`). 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
@@ -37,7 +37,7 @@ from harness.game.observation_layout import SIZE
 from harness.game.outcome import Outcome
 from harness.game.quantities import Quantities
 from harness.game.sanity_checks import check_observation, check_step, checked_decisions, slack_m
-from harness.game.state import Bodies, State
+from harness.game.state import State
 from harness.game.terminations import terminations
 from harness.game.traffic_rules import since_change_s
 from harness.game.walking import walk
@@ -92,12 +92,16 @@ class Arena(LiveSimulation):
         """Load SUMO, or use another `simulation`. Each game needs a `reset` before the first step.
 
         `seats` has one entry per player: a seat, or several, of which `InitialState.member` selects one per game. SUMO
-        drives all seats of a player or none. `recorded`: `reading` contains all background vehicles in every step, not
-        only those near a player; this costs time. Raises SimulationError if SUMO can't load the scene.
+        drives all seats of a player or none; where it can't, in the place of a pedestrian, an ordinary walker does.
+        Another simulation drives all. `recorded`: `reading` contains all background vehicles in every step, not only
+        those near a player; this costs time. Raises SimulationError if SUMO can't load the scene.
         """
         self.scene, self.world, self.games = scene, scene.world, games
-        self.seats = with_walkers([(each,) if isinstance(each, Seat) else tuple(each) for each in seats], scene.world)
+        self.seats = tuple((each,) if isinstance(each, Seat) else tuple(each) for each in seats)
+        if simulation is None:
+            self.seats = with_walkers(self.seats, scene.world)
         first_drivers = [of_player[0].driver for of_player in self.seats]
+        self._learns = np.array([driver is None for driver in first_drivers])
         self._taken_over = np.array([driver is None or driver.takes_over for driver in first_drivers])
         self._on_wheels = self._taken_over & ~self.world.walks
         self._slack_m = slack_m(self._taken_over)
@@ -135,11 +139,10 @@ class Arena(LiveSimulation):
             elif self.reading is not None:
                 self.reading.present[game] = False
         games = np.array(sorted(starts), dtype=np.int64)
-        for player, seats in enumerate(self.seats):
-            for member, seat in enumerate(seats):
-                if seat.driver is not None:
-                    seat.driver.reset(games if len(seats) == 1 else games[self._member[games, player] == member])
-        quantities = self._first_quantities(games)
+        for _, seat, plays in self._seats_in(np.ones(self.state.present.shape, dtype=bool)):
+            if seat.driver is not None:
+                seat.driver.reset(games[plays[games]])
+        quantities = self.first_quantities(games)
         observation = self.observation[games] = observe(quantities)
         self._road_steering_rad[games] = quantities.road_steering_rad
         check_observation(observation, games, self.state.step)
@@ -165,19 +168,17 @@ class Arena(LiveSimulation):
             walk(state, requested._replace(moving=drove & world.walks), world.actuators, world.step_s)
         reading = self.reading = self.simulation.step(state.x_m, state.y_m, state.heading_rad)
         if reading.signals is not None:
-            state.signal_s = since_change_s(before.signals, reading.signals, before.signal_s, self.world.step_s)
+            state.signal_s = since_change_s(before.signals, reading.signals, before.signal_s, world.step_s)
             state.signals = reading.signals
             self.signal_texts = list(reading.signal_texts or self.signal_texts)
-        read_sumo_players(state, reading, drove=drove, taken_over=self._taken_over, step_s=self.world.step_s)
-        bodies = self._bodies(state)
-        advanced_m, offset_m = self._locate()
-        quantities = Quantities(
-            world=self.world, state=state, bodies=bodies, advanced_m=advanced_m, lateral_offset_m=offset_m
-        )
+        read_sumo_players(state, reading, drove=drove, taken_over=self._taken_over, step_s=world.step_s)
+        state.station_m, offset_m = world.road.routes.locate(state.x_m, state.y_m, before.station_m)
+        quantities = self._quantities(state, state.station_m - before.station_m, offset_m)
         state.step = state.step + 1
         if self._limits.misjudges:
             self._limits.look(state)
-        self._terminations(quantities, drove)
+        distances_m = (quantities.goal_m, quantities.vehicle_clearance_m, quantities.rail_clearance_m)
+        terminations(state.outcome, drove, (self._taken_over, state.step >= world.steps), distances_m)
         payoff = self._payoffs(quantities, drove)
         check_step(before, quantities, drove=drove, payoff=payoff, slack_m=self._slack_m)
         self._finish(quantities, drove)
@@ -193,19 +194,16 @@ class Arena(LiveSimulation):
     def _decide(self, actions: FloatArray | None, drove: BoolArray) -> tuple[FloatArray, FloatArray]:
         state = self.state
         now = np.minimum(state.step, self.world.steps - 1)
-        chosen = np.zeros((*drove.shape, 2)) if actions is None else np.array(actions, dtype=float)
-        for player, seats in enumerate(self.seats):
-            if seats[0].driver is not None:
-                chosen[:, player] = 0.0
-            for member, seat in enumerate(seats):
-                if seat.driver is None:
-                    continue
-                games = np.flatnonzero(drove[:, player] if len(seats) == 1 else self._drove_as(drove, player, member))
-                if seat.driver.takes_over and len(games):
-                    noise = self._noise[games, player, now[games]]
-                    decided = seat.driver.decide(games, self.observation[games, player], noise)
-                    of = f"{self.world.roles[player]}, {type(seat.driver).__name__},"
-                    chosen[games, player] = checked_decisions(decided, of, games, state.step)
+        chosen: FloatArray = np.zeros((*drove.shape, 2))
+        if actions is not None:
+            chosen[:, self._learns] = np.asarray(actions, dtype=float)[:, self._learns]
+        for player, seat, plays in self._seats_in(drove):
+            games = np.flatnonzero(plays)
+            if seat.driver is not None and seat.driver.takes_over and len(games):
+                noise = self._noise[games, player, now[games]]
+                decided = seat.driver.decide(games, self.observation[games, player], noise)
+                of = f"{self.world.roles[player]}, {type(seat.driver).__name__},"
+                chosen[games, player] = checked_decisions(decided, of, games, state.step)
         if self._limits.delays:
             chosen = self._limits.arriving(chosen, now)
         acceleration, steering = requests(chosen, state.speed_mps, self._road_steering_rad, self.world.actuators)
@@ -215,30 +213,19 @@ class Arena(LiveSimulation):
         state.lapsed = release_controls((acceleration, steering), lapses, now, drove)
         return acceleration, steering
 
-    def _locate(self) -> tuple[FloatArray, FloatArray]:
-        """[G, P] distance along the route in this step, and lateral offset from the route."""
-        state, before = self.state, self.state.station_m
-        state.station_m, offset = self.world.road.routes.locate(state.x_m, state.y_m, before)
-        return state.station_m - before, offset
-
-    def _terminations(self, quantities: Quantities, drove: BoolArray) -> None:
-        state = self.state
-        distances_m = (quantities.goal_m, quantities.vehicle_clearance_m, quantities.rail_clearance_m)
-        time_is_up = state.step >= self.world.steps
-        terminations(state.outcome, drove, (self._taken_over, time_is_up), distances_m)
-
     def _payoffs(self, quantities: Quantities, drove: BoolArray) -> FloatArray:
         payoff = np.zeros(drove.shape)
-        for player, seats in enumerate(self.seats):
-            for member, seat in enumerate(seats):
-                if seat.payoff is not None:
-                    paid = drove[:, player] if len(seats) == 1 else self._drove_as(drove, player, member)
-                    payoff[paid, player] = seat.payoff.total(quantities, player)[paid]
+        for player, seat, paid in self._seats_in(drove):
+            if seat.payoff is not None:
+                payoff[paid, player] = seat.payoff.total(quantities, player)[paid]
         return payoff
 
-    def _drove_as(self, drove: BoolArray, player: int, member: int) -> BoolArray:
-        """[G] the games in which the player drove with this one of its seats."""
-        return drove[:, player] & (self._member[:, player] == member)
+    def _seats_in(self, plays: BoolArray) -> Iterator[tuple[int, Seat, BoolArray]]:
+        """Each seat with its player, and the games [G] of `plays` [G, P] in which the player has this seat."""
+        for player, seats in enumerate(self.seats):
+            for member, seat in enumerate(seats):
+                own = plays[:, player]
+                yield player, seat, own if len(seats) == 1 else own & (self._member[:, player] == member)
 
     def _finish(self, quantities: Quantities, drove: BoolArray) -> None:
         """Remove players that reached their goal, stop those that crashed, and observe."""
@@ -252,28 +239,17 @@ class Arena(LiveSimulation):
                 self.simulation.remove(game, player)
             else:
                 self.simulation.halt(game, player)
-        self.state = self.state.copy()  # `quantities` refers to the old state
-        self._stop(ended)
+        state = self.state = self.state.copy()  # `quantities` refers to the old state
+        state.present &= ~(ended & (outcome == _GOAL))
+        state.speed_mps[ended] = 0.0
+        state.acceleration_mps2[ended] = 0.0
+        state.lapsed[ended] = False
         # Positions are unchanged: only speeds are, and which players are present.
-        after = Quantities(
-            world=self.world,
-            state=self.state,
-            bodies=self._bodies(self.state),
-            advanced_m=quantities.advanced_m,
-            lateral_offset_m=quantities.lateral_offset_m,
-        )
-        self._observe(after)
+        self._observe(self._quantities(state, quantities.advanced_m, quantities.lateral_offset_m))
 
     def _observe(self, quantities: Quantities) -> None:
         """Observe, and keep what the next decisions need: the steering that follows the road."""
         self.observation, self._road_steering_rad = observe(quantities), quantities.road_steering_rad
-
-    def _stop(self, ended: BoolArray) -> None:
-        state = self.state
-        state.present &= ~(ended & (state.outcome == _GOAL))
-        state.speed_mps[ended] = 0.0
-        state.acceleration_mps2[ended] = 0.0
-        state.lapsed[ended] = False
 
     # --- observations ------------------------------------------------------------------------------------
 
@@ -294,22 +270,21 @@ class Arena(LiveSimulation):
         if self._has_drivers:
             self._noise[game] = start.noise
 
-    def _first_quantities(self, games: IntArray) -> Quantities:
+    def first_quantities(self, games: IntArray) -> Quantities:
         """Quantities of games [N] after a reset."""
         state, routes = self.state.of(games), self.world.road.routes
-        state.station_m, offset = routes.locate(state.x_m, state.y_m, state.station_m)
+        state.station_m, offset_m = routes.locate(state.x_m, state.y_m, state.station_m)
         self.state.station_m[games] = state.station_m
-        return Quantities(
-            world=self.world,
-            state=state,
-            bodies=self._bodies(state, games),
-            advanced_m=np.zeros(offset.shape),
-            lateral_offset_m=offset,
-        )
+        return self._quantities(state, np.zeros(offset_m.shape), offset_m, games)
 
-    def _bodies(self, state: State, games: IntArray | slice = slice(None)) -> Bodies:
-        """The players and the bodies near them in `games`; `state` is that of the same games."""
-        return self.nearby.of(state, self.reading, games)
+    def _quantities(
+        self, state: State, advanced_m: FloatArray, offset_m: FloatArray, games: IntArray | slice = slice(None)
+    ) -> Quantities:
+        """Quantities of `games`, whose players have this state, advance along their routes and lateral offset."""
+        bodies = self.nearby.of(state, self.reading, games)
+        return Quantities(
+            world=self.world, state=state, bodies=bodies, advanced_m=advanced_m, lateral_offset_m=offset_m
+        )
 
 
 def read_sumo_players(

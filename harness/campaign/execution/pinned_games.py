@@ -106,7 +106,7 @@ class PinnedGames:
         ego, people = self._players.ego(stage), self._players.people(stage, failure.episode)
         arm = seated_arm(self._players.scene, failure.arm, failure.seed, (ego, *people))
         with StartTrials(arm, failure.episode) as trials:
-            game = trials.drawn()
+            game = trials.play(None)
             if not game.record.get("ego_failed"):
                 message = "played again, the ego does not fail: the run was made by another version or machine"
                 raise UsageError.of(self._out, f"{failure.arm} {failure.episode}", message, "run the campaign again")
