@@ -242,9 +242,7 @@ def _check_determinism(
         if not driver.takes_over and not np.array_equal(one.motion, other.motion):
             findings.violations.append(f"it is not deterministic: game {number}, played again, had another motion")
             return
-    findings.passed.append(
-        f"the same games again: the same {'actions' if driver.takes_over else 'motion'}, bit for bit"
-    )
+    findings.passed.append(f"the same games again: the same {what}, bit for bit")
 
 
 def _check_independence(driver: Driver, played: Sequence[Sequence[Decision]], findings: Findings) -> None:

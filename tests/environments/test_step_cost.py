@@ -216,7 +216,7 @@ def test_reset__without_background_traffic_players_stay_in_sumo(scenes: Scenes) 
 
 def test_step__releases_the_memory_that_it_takes(scenes: Scenes) -> None:
     with counting(scenes.empty, FEW) as counted:
-        counted.steps()
+        counted.steps(500)  # until caches are filled
         gc.collect()
         before = sys.getallocatedblocks()
         counted.steps(500)
