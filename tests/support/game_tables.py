@@ -43,6 +43,7 @@ def arm(
             "non_ego_outcome": "" if failed is None else "goal",
             "non_ego_payoff": math.nan if failed is None else non_ego[place],
             "duration_s": 10.0,
+            "severity": {None: math.nan, 0: 0.0, 1: 300.0}[failed],
             "error": "it died" if failed is None else "",
         }
         for place, failed in enumerate(ego_failed)

@@ -160,7 +160,8 @@ def _game(
     if "_vs_" in arm or failing is None:
         row |= {"non_ego_outcome": "goal" if random.uniform() < 0.97 else "rail"}
         row |= {"non_ego_mean_speed_mps": random.normal(15, 1), "non_ego_payoff": random.normal(10, 2)}
-    return row
+    severities = {"collision": 300.0, "rail": 200.0, "timeout": 100.0}
+    return row | {"severity": severities.get(row["ego_outcome"] or row["non_ego_outcome"], 0.0)}
 
 
 def _windows(stage: str, seed: int, random: np.random.Generator) -> Iterator[dict[str, Any]]:
