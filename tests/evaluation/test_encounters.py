@@ -228,8 +228,3 @@ def test_wrong_way__among_oncoming_lanes_for_a_second(merge: OpenScene, speed_mp
     oncoming = replace(road, routes=routes._replace(own_left_m=np.where(there, -0.1, routes.own_left_m)))
     found = named(replace(merge.world, road=oncoming), ego(speed_mps=speed_mps))
     assert [each.manoeuvre for each in found] == (["wrong_way"] if seconds >= 1.0 else [])
-
-
-def test_crossing__is_no_cut_in(world: World) -> None:
-    found = find_manoeuvres(Course(game=game(world, trace_of(ego(), northbound(-40.0)), KINDS)))
-    assert "cut_in" not in {each.manoeuvre for each in found}

@@ -94,7 +94,8 @@ def test_heat_map__has_the_tables_number_in_every_cell(found):
 def test_heat_map__a_cell_links_to_the_worst_of_its_games(found):
     games = campaign(personas=["speedy"])["episodes"]
     games = games[games["arm"] == "naive_vs_speedy"].head(3)
-    episodes = games.assign(seed=[1, 1, 2], episode=[0, 7, 3], ego_outcome=["goal", "collision", "goal"])
+    outcomes, severity = ["goal", "collision", "goal"], [0.0, 300.0, 0.0]
+    episodes = games.assign(seed=[1, 1, 2], episode=[0, 7, 3], ego_outcome=outcomes, severity=severity)
     worst = "naive_vs_speedy,1,7"
     mean, first, second = views(found.crossplay, GameLinks(embedded={worst}, episodes=episodes))
     for view in (mean, first):
