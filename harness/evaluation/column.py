@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass, replace
 
 TEXT, FLAG = "object", "bool"
@@ -50,8 +50,3 @@ class Column:
         for end in ("low", "high"):
             what = f"The {end} end of the {interval} of {self.name}."
             yield replace(self, name=f"{self.name}_{end}", meaning=what, source="", label="")
-
-
-def by_name(*columns: Column) -> Mapping[str, Column]:
-    """The columns of a table, in order."""
-    return {column.name: column for column in columns}

@@ -6,19 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
-from harness.evaluation.column import (
-    COUNT,
-    FLAG,
-    MAYBE,
-    NUMBER,
-    OF_METRIC,
-    P_VALUE,
-    POINTS,
-    SHARE,
-    TEXT,
-    Column,
-    by_name,
-)
+from harness.evaluation.column import COUNT, FLAG, MAYBE, NUMBER, OF_METRIC, P_VALUE, POINTS, SHARE, TEXT, Column
 from harness.evaluation.measured_game import METRICS_OF_GAMES, METRICS_OF_PLAYERS
 
 _EXACT, _T = "95 % Clopper-Pearson interval", "95 % t interval"
@@ -271,28 +259,31 @@ _PREVENTABILITY = (
     *_prevented("from_start"),
 )
 
-TABLES: Mapping[str, Mapping[str, Column]] = {
-    "episodes": by_name(
+_TABLES = {
+    "episodes": (
         *(*_GAME, _outcome("ego", "ego"), _EGO_FAILED, *_of_player("ego", "ego")),
         *(_outcome("non_ego", "person"), *_of_player("non_ego", "person")),
         Column("duration_s", NUMBER, "Duration of the game."),
         *(each.column for each in METRICS_OF_GAMES),
         _ERROR,
     ),
-    "played": by_name(*_GAME, _outcome("ego", "ego"), _outcome("non_ego", "person"), _ERROR),
-    "causes": by_name(*_CAUSES),
-    "manoeuvres": by_name(*_MANOEUVRES),
-    "summary": by_name(*_summary()),
-    "comparisons": by_name(*_COMPARISONS),
-    "training": by_name(*_TRAINING),
-    "populations": by_name(*_POPULATIONS),
-    "reconfiguration": by_name(*_RECONFIGURATION),
-    "gaps": by_name(*_GAPS),
-    "crossplay": by_name(*_CROSSPLAY),
-    "equilibria": by_name(*_EQUILIBRIA),
-    "generalisation": by_name(*_GENERALISATION),
-    "reference_drivers": by_name(*_REFERENCE_DRIVERS),
-    "preventability": by_name(*_PREVENTABILITY),
+    "played": (*_GAME, _outcome("ego", "ego"), _outcome("non_ego", "person"), _ERROR),
+    "causes": _CAUSES,
+    "manoeuvres": _MANOEUVRES,
+    "summary": tuple(_summary()),
+    "comparisons": _COMPARISONS,
+    "training": _TRAINING,
+    "populations": _POPULATIONS,
+    "reconfiguration": _RECONFIGURATION,
+    "gaps": _GAPS,
+    "crossplay": _CROSSPLAY,
+    "equilibria": _EQUILIBRIA,
+    "generalisation": _GENERALISATION,
+    "reference_drivers": _REFERENCE_DRIVERS,
+    "preventability": _PREVENTABILITY,
+}
+TABLES: Mapping[str, Mapping[str, Column]] = {
+    table: {column.name: column for column in columns} for table, columns in _TABLES.items()
 }
 """Each table by the name of its file; `played` is what a stage stores of the games that it plays."""
 

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
-from harness.game.junctions import Signal
+from harness.game.junctions import RightOfWay, Signal
 from harness.game.meetings import STANDING_MPS, has_duty
 from harness.game.passages import Passage, Places, other_passage, own_passage, places
 from harness.game.quantities import Quantities
@@ -51,49 +51,47 @@ def encounters_of(q: Quantities, player: int, drove: BoolArray) -> list[Encounte
     return sorted(found, key=lambda each: (each.own.enters_s, each.conflict, each.body))
 
 
+@dataclass(frozen=True, eq=False)
 class _Search:
-    def __init__(self, q: Quantities, player: int, drove: BoolArray) -> None:
-        self._q, self._player, self._drove = q, player, drove
-        self._tables = q.world.right_of_way
-        self._step_s = q.world.step_s
-        self._length_m = float(q.world.length_m[player])
+    q: Quantities
+    player: int
+    drove: BoolArray
 
-    @cached_property
-    def _places(self) -> Places:
-        return Places(*places(tuple(self._q.bodies), tuple(self._tables.streams)))
+    @property
+    def _tables(self) -> RightOfWay:
+        return self.q.world.right_of_way
+
+    @property
+    def _step_s(self) -> float:
+        return self.q.world.step_s
 
     @cached_property
     def _front_m(self) -> FloatArray:
         """[T] station of the player's front while it drove; NaN otherwise."""
-        return np.where(self._drove, self._q.state.station_m[:, self._player] + 0.5 * self._length_m, np.nan)
+        half_m = 0.5 * self.q.world.length_m[self.player]
+        return np.where(self.drove, self.q.state.station_m[:, self.player] + half_m, np.nan)
 
     def encounters(self) -> Iterator[Encounter]:
         """The encounters in every zone that the player enters."""
-        conflicts, q = self._tables.conflicts, self._q
-        speed_mps, offset_m = q.state.speed_mps[:, self._player], q.lateral_offset_m[:, self._player]
-        for c in np.flatnonzero(conflicts.player == self._player).tolist():
+        conflicts, q, length_m = self._tables.conflicts, self.q, float(self.q.world.length_m[self.player])
+        speed_mps, offset_m = q.state.speed_mps[:, self.player], q.lateral_offset_m[:, self.player]
+        there = Places(*places(tuple(q.bodies), tuple(self._tables.streams)))
+        for c in np.flatnonzero(conflicts.player == self.player).tolist():
             zone_m = (conflicts.begin_m[c], conflicts.end_m[c])
-            own = own_passage(self._front_m, speed_mps, zone_m, length_m=self._length_m, step_s=self._step_s)
-            if own is None:
+            own = own_passage(self._front_m, speed_mps, zone_m, length_m=length_m, step_s=self._step_s)
+            if own is None or not conflicts.right_m[c] <= offset_m[self._step_of(own)] <= conflicts.left_m[c]:
                 continue
-            offset = offset_m[self._step_of(own)]
-            if conflicts.right_m[c] <= offset <= conflicts.left_m[c]:
-                yield from self._with_bodies(c, own)
+            in_stream = (there.stream == conflicts.stream[c]) & (there.body != self.player)
+            for body in np.unique(there.body[in_stream]).tolist():
+                rows = in_stream & (there.body == body)
+                yield from self._encounter(c, own, body, there.step[rows], there.along_m[rows])
 
     def _step_of(self, own: Passage) -> int:
         """The first step in which the player is in the zone."""
-        return min(int(np.ceil(own.enters_s / self._step_s - 1e-9)), len(self._drove) - 1)
-
-    def _with_bodies(self, c: int, own: Passage) -> Iterator[Encounter]:
-        there, conflicts = self._places, self._tables.conflicts
-        in_stream = there.stream == conflicts.stream[c]
-        for body in np.unique(there.body[in_stream]).tolist():
-            rows = in_stream & (there.body == body)
-            if body != self._player:
-                yield from self._encounter(c, own, body, there.step[rows], there.along_m[rows])
+        return min(int(np.ceil(own.enters_s / self._step_s - 1e-9)), len(self.drove) - 1)
 
     def _encounter(self, c: int, own: Passage, body: int, steps: IntArray, along_m: FloatArray) -> Iterator[Encounter]:
-        q, conflicts = self._q, self._tables.conflicts
+        q, conflicts = self.q, self._tables.conflicts
         speed_mps, length_m = q.bodies.speed_mps[steps, body], float(q.bodies.length_m[steps[0], body])
         on_stream = (along_m >= conflicts.from_m[c]) & (along_m <= conflicts.until_m[c])
         steps, along_m, speed_mps = steps[on_stream], along_m[on_stream], speed_mps[on_stream]
@@ -114,7 +112,7 @@ class _Search:
     def _follows(self, c: int, body: int, steps: IntArray, along_m: FloatArray, speed_mps: FloatArray) -> bool:
         """Whether a body in the stream of conflict `c` in `steps` [N] follows it: it comes in before the junction, and
         does not leave it before the end of the zone. Its first and last step in the game are no such moments."""
-        present, conflicts = self._q.bodies.present[:, body], self._tables.conflicts
+        present, conflicts = self.q.bodies.present[:, body], self._tables.conflicts
         reach_m = speed_mps * self._step_s  # in a step
         there = np.flatnonzero(present)
         comes_in = along_m[0] <= reach_m[0] or steps[0] == there[0]
@@ -134,7 +132,7 @@ class _Search:
     def _signal(self, link: int, passed: BoolArray, steps: IntArray) -> int:
         """The state of a link when a side passed its stop line: in the first of `steps` [N] with `passed` [N], else in
         the last of them; off without a signal."""
-        signals = self._q.state.signals
+        signals = self.q.state.signals
         if link < 0 or link >= signals.shape[1] or not len(steps):
             return int(Signal.OFF)
         entries = np.flatnonzero(passed)

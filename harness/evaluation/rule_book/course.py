@@ -100,20 +100,16 @@ class Course:
     def stretches(self, mask: BoolArray, least_s: float, parted: BoolArray | None = None) -> Iterator[Stretch]:
         """The stretches over which `mask` [T] holds for at least `least_s` in total. A pause of up to `SAME_WITHIN_S`
         is ignored, unless `parted` [T] holds in it."""
-        spans: list[list[int]] = []
-        counts: list[int] = []
+        joined: list[list[Stretch]] = []
         for first, last in runs(mask):
-            pause = slice(spans[-1][1] + 1 if spans else 0, first)
-            continues = bool(spans) and first - pause.start <= self.steps(at.SAME_WITHIN_S)
-            if continues and not (parted is not None and parted[pause].any()):
-                spans[-1][1] = last
-                counts[-1] += last - first + 1
-            else:
-                spans.append([first, last])
-                counts.append(last - first + 1)
-        for (first, last), count in zip(spans, counts, strict=True):
-            if count >= self.steps(least_s):
-                yield first, last
+            end = joined[-1][-1][1] + 1 if joined else first
+            apart = first - end > self.steps(at.SAME_WITHIN_S) or (parted is not None and parted[end:first].any())
+            if apart or not joined:
+                joined.append([])
+            joined[-1].append((first, last))
+        for parts in joined:
+            if sum(last - first + 1 for first, last in parts) >= self.steps(least_s):
+                yield parts[0][0], parts[-1][1]
 
     def encounters(self, player: int) -> list[Encounter]:
         """The player's encounters with other road users at junctions, until the end of the ego's game."""
@@ -157,10 +153,6 @@ class Course:
         return own - np.maximum(curve, 0.0) * self.quantities.speed_mps[:, player] ** 2
 
     # --- relative to another body ----------------------------------------------------------------------------------
-
-    def length_m(self, body: int) -> float:
-        """A body's length."""
-        return self.game.body_kinds[body].length_m
 
     def ahead_m(self, body: int, of: int) -> FloatArray:
         """[T] how far the centre of a body is ahead of that of player `of`, along the player's route."""

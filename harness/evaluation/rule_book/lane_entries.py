@@ -98,7 +98,7 @@ def entries(course: Course, body: int, of: int) -> Iterator[tuple[str, Span]]:
     lane, q = in_lane(course, body, of), course.quantities
     there = course.drove[:, of] & (course.drove[:, body] if body < course.drove.shape[1] else q.bodies.present[:, body])
     crosses = np.flatnonzero(lane.inside[1:] & ~lane.inside[:-1] & there[1:] & there[:-1]) + 1
-    gap_m, behind_m = course.gap_m(body, of), course.length_m(body) + course.length_m(of)
+    gap_m, behind_m = course.gap_m(body, of), sum(course.game.body_kinds[each].length_m for each in (body, of))
     same_until = -1
     for step in crosses.tolist():
         if step <= same_until or lane.changes_lane(step) or gap_m[step] <= -behind_m:
