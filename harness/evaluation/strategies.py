@@ -125,18 +125,14 @@ def against_persona(ego: EgoStrategy, persona: str) -> Arm:
 
 def counterparts(arm: Arm) -> list[Arm]:
     """The arms to compare an arm with: the ego of round 2 with the naive ego, against the persona of its training."""
-    match arm:
-        case Arm(ego=NaiveEgo(), non_ego=PersonaNonEgo(persona=persona, round=1), best_response_of=None):
-            round_2 = (RetrainedEgo(against=persona), ReconfiguredEgo(against=persona))
-            return [against_persona(ego, persona) for ego in round_2]
-        case Arm(
-            ego=RetrainedEgo(against=against, round=2) | ReconfiguredEgo(against=against),
-            non_ego=PersonaNonEgo(persona=persona, round=1),
-            best_response_of=None,
-        ) if against == persona:
-            return [against_persona(NaiveEgo(), persona)]
-        case _:
-            return []
+    if not isinstance(arm.non_ego, PersonaNonEgo):
+        return []
+    persona = arm.non_ego.persona
+    naive = against_persona(NaiveEgo(), persona)
+    round_2 = [against_persona(ego(against=persona), persona) for ego in (RetrainedEgo, ReconfiguredEgo)]
+    if arm == naive:
+        return round_2
+    return [naive] if arm in round_2 else []
 
 
 def strategy_name(strategy: Strategy) -> str:

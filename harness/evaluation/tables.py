@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import csv
 import io
-import shutil
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ from harness.errors import UsageError
 from harness.evaluation.column import COUNT, FLAG, NUMBER, TEXT, Column
 from harness.evaluation.columns import TABLES
 from harness.evaluation.people import columns_for, people_in
-from harness.files import content_of, replace_durably, scratch_beside, write_atomically
+from harness.files import content_of, write_atomically
 
 _MOST_BYTES = 500_000_000
 _TRUTH = {"true": True, "false": False}
@@ -98,21 +97,6 @@ def exact(value: object) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     return value if isinstance(value, str) else "" if pd.isna(value) else repr(value)
-
-
-def join_csv(parts: Sequence[Path], path: Path) -> None:
-    """Concatenate tables with the same columns, each a file of `write_csv`. The bytes are those of one table."""
-    scratch = scratch_beside(path)
-    try:
-        with scratch.open("wb") as target:
-            for number, part in enumerate(parts):
-                with part.open("rb") as lines:
-                    header = lines.readline()
-                    target.write(b"" if number else header)
-                    shutil.copyfileobj(lines, target)
-        replace_durably(scratch, path)
-    finally:
-        scratch.unlink(missing_ok=True)
 
 
 def read_csv(path: Path) -> pd.DataFrame:

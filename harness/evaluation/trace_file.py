@@ -9,9 +9,10 @@ from __future__ import annotations
 import json
 import math
 from collections import OrderedDict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from types import MappingProxyType, TracebackType
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -61,27 +62,19 @@ _TEXTS = [field.name for field in SCHEMA if field.type == _TEXT]
 _NUMBERS = [field.name for field in SCHEMA if field.type == pa.float64()]
 
 
-class TraceWriter:
-    """Writes the games of a segment. The file appears only when all games are in it."""
+@contextmanager
+def trace_writer(path: Path) -> Iterator[Callable[[Mapping[str, Sequence[Any]]], None]]:
+    """Writes the games of a segment: a function that adds one, as columns of its trace. The file appears only when all
+    games are in it."""
+    games: list[pa.Table] = [SCHEMA.empty_table()]
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._games: list[pa.Table] = []
+    def add(columns: Mapping[str, Sequence[Any]]) -> None:
+        games.append(
+            pa.table({name: pa.array(columns[name], SCHEMA.field(name).type) for name in SCHEMA.names}, SCHEMA)
+        )
 
-    def __enter__(self) -> TraceWriter:
-        return self
-
-    def add(self, columns: Mapping[str, Sequence[Any]]) -> None:
-        """Add one game, as columns of its trace."""
-        arrays = {name: pa.array(columns[name], SCHEMA.field(name).type) for name in SCHEMA.names}
-        self._games.append(pa.table(arrays, SCHEMA))
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        if kind is None:
-            games = pa.concat_tables(self._games) if self._games else SCHEMA.empty_table()
-            _write([games.unify_dictionaries().combine_chunks()], self._path)
+    yield add
+    _write([pa.concat_tables(games).unify_dictionaries().combine_chunks()], path)
 
 
 def join_traces(parts: Sequence[Path], path: Path, labels: Mapping[str, str | int] = MappingProxyType({})) -> None:

@@ -18,16 +18,13 @@ def reason_of(error: str) -> str:
 
 def reasons_of(errors: Iterable[str]) -> list[str]:
     """A line for each reason, the most frequent first, with the number of its games and the first error of it."""
-    first, counts = dict[str, str](), dict[str, int]()
+    groups: dict[str, list[str]] = {}
     for error in filter(None, errors):
-        reason = reason_of(error)
-        first.setdefault(reason, error)
-        counts[reason] = counts.get(reason, 0) + 1
-    ordered = sorted(counts, key=lambda reason: -counts[reason])
-    lines = [f"{_games(counts[each])}: {_shortened(first[each])}" for each in ordered[:SHOWN]]
-    if more := ordered[SHOWN:]:
-        others = _games(sum(counts[each] for each in more))
-        lines.append(f"{others}: other reasons, in the column error of episodes.csv")
+        groups.setdefault(reason_of(error), []).append(error)
+    ordered = sorted(groups.values(), key=len, reverse=True)
+    lines = [f"{_games(len(group))}: {_shortened(group[0])}" for group in ordered[:SHOWN]]
+    if others := sum(map(len, ordered[SHOWN:])):
+        lines.append(f"{_games(others)}: other reasons, in the column error of episodes.csv")
     return lines
 
 

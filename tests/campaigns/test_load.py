@@ -33,7 +33,7 @@ from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
 from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.tables import table_of, typed
-from harness.evaluation.trace_file import SCHEMA, TraceWriter
+from harness.evaluation.trace_file import SCHEMA, trace_writer
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.outcome import Outcome
 from harness.replay.selection import MOST_FAILURES_PER_ARM, choose_games, replay_name
@@ -113,12 +113,12 @@ def assessment() -> Iterator[Weight]:
         for first in range(0, ASSESSED, GAMES_PER_FILE):
             if first % (ASSESSED // WEIGHED) == 0:
                 yield Weight.now(first)
-            with TraceWriter(folder / "traces.parquet") as traces:
+            with trace_writer(folder / "traces.parquet") as add_trace:
                 for _ in range(GAMES_PER_FILE):
                     game = next(games)
                     assert game.record["ego_outcome"] == "goal"
                     assert game.trace is not None
-                    traces.add(game.trace)
+                    add_trace(game.trace)
         yield Weight.now(ASSESSED)
         games.close()  # type: ignore[attr-defined]
 

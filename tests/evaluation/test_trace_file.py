@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from harness.evaluation import trace_file
-from harness.evaluation.trace_file import SCHEMA, TraceReader, TraceWriter, join_traces, read_trace
+from harness.evaluation.trace_file import SCHEMA, TraceReader, join_traces, read_trace, trace_writer
 
 
 def game(episode: int, steps: int = 3) -> dict[str, list[Any]]:
@@ -40,9 +40,9 @@ def game(episode: int, steps: int = 3) -> dict[str, list[Any]]:
 
 
 def write(path: Path, *games: dict[str, list[Any]]) -> None:
-    with TraceWriter(path) as traces:
+    with trace_writer(path) as add_trace:
         for each in games:
-            traces.add(each)
+            add_trace(each)
 
 
 def test_trace__is_read_back_unchanged(tmp_path: Path) -> None:
@@ -103,8 +103,8 @@ def test_trace_writer__an_interrupted_arm_keeps_the_old_file(tmp_path: Path) -> 
     before = file.read_bytes()
 
     def cut_short() -> None:
-        with TraceWriter(file) as traces:
-            traces.add(game(0))
+        with trace_writer(file) as add_trace:
+            add_trace(game(0))
             raise RuntimeError("cut short")
 
     with pytest.raises(RuntimeError, match="cut short"):

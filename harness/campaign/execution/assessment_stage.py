@@ -26,8 +26,8 @@ from harness.campaign.storage.checksums import mismatches, read_checksums, write
 from harness.campaign.storage.versions import versions_of_numbers
 from harness.errors import StageFailed
 from harness.evaluation.competence import goals_alone
-from harness.evaluation.tables import join_csv, table_of, write_csv
-from harness.evaluation.trace_file import TraceWriter, join_traces
+from harness.evaluation.tables import joined, read_csv, table_of, write_csv
+from harness.evaluation.trace_file import join_traces, trace_writer
 from harness.evaluation.unplayed_games import reason_of
 from harness.files import make_folder
 
@@ -62,12 +62,12 @@ class Segment:
     ) -> int:
         """Play it; `games` yields its games next. Returns how many of them could not be played."""
         records = []
-        with TraceWriter(self.file(_TRACES)) as traces:
+        with trace_writer(self.file(_TRACES)) as add_trace:
             for _ in self.episodes:
                 game = next(games)
                 records.append({**game.played, **labels})
                 if game.trace is not None:
-                    traces.add(game.trace)
+                    add_trace(game.trace)
                 on_game(game)
         table = table_of("played", records, len(arm.drivers) - 1)
         write_csv(table, self.file(PLAYED))
@@ -145,5 +145,5 @@ def join_segments(
     labels: Mapping[str, str | int] = MappingProxyType({}),
 ) -> None:
     """Join the segments of an arm into its log. `labels` name the arm in the metadata of its traces."""
-    join_csv([segment.file(PLAYED) for segment in segments], played)
+    write_csv(joined("played", [read_csv(segment.file(PLAYED)) for segment in segments]), played)
     join_traces([segment.file(_TRACES) for segment in segments], traces, labels)

@@ -1,17 +1,15 @@
-"""Cross-play: every ego against every non-ego, over the same starts, as a table and as matrices."""
+"""Cross-play: every ego against every non-ego, over the same starts."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
-import numpy as np
 import pandas as pd
 
 from harness.evaluation.comparisons.comparison import games_by_arm, mean_cells, measured_values, rate_cells
 from harness.evaluation.research_questions import AloneBound
 from harness.evaluation.tables import table_of
-from harness.game.arrays import FloatArray
 
 MEASURED = ("ego_failed", "ego_payoff", "non_ego_payoff", "ego_mean_speed_mps")
 
@@ -58,47 +56,3 @@ def _row(pairing: Pairing, values: pd.DataFrame, episodes: int) -> dict[str, obj
     for name in ("ego_payoff", "non_ego_payoff"):
         row |= mean_cells(name, known[name].dropna().to_numpy())
     return row | {"ego_mean_speed_mps": known["ego_mean_speed_mps"].mean()}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Matrices:
-    """A seed's cross-play as matrices [E, N]; NaN where a pairing was not played."""
-
-    egos: Sequence[str]
-    non_egos: Sequence[str]
-    personas: Sequence[str]
-    """The personas of the non-egos [N]."""
-    failure_rates: FloatArray
-    ego_payoffs: FloatArray
-    non_ego_payoffs: FloatArray
-
-    def among(self, egos: Sequence[int], non_egos: Sequence[int]) -> Matrices:
-        """The rows and columns at these places."""
-        at = np.ix_(egos, non_egos)
-        return Matrices(
-            egos=[self.egos[place] for place in egos],
-            non_egos=[self.non_egos[place] for place in non_egos],
-            personas=[self.personas[place] for place in non_egos],
-            failure_rates=self.failure_rates[at],
-            ego_payoffs=self.ego_payoffs[at],
-            non_ego_payoffs=self.non_ego_payoffs[at],
-        )
-
-
-def matrices(found: pd.DataFrame) -> Matrices:
-    """The rows of `crossplay` of one seed as matrices; egos and non-egos in order of first appearance."""
-    egos, non_egos = list(dict.fromkeys(found["ego"])), list(dict.fromkeys(found["non_ego"]))
-    persona = dict(zip(found["non_ego"], found["persona"], strict=True))
-
-    def matrix(column: str) -> FloatArray:
-        cells = found.pivot(index="ego", columns="non_ego", values=column)
-        return cells.reindex(index=egos, columns=non_egos).to_numpy(dtype=np.float64)
-
-    return Matrices(
-        egos=egos,
-        non_egos=non_egos,
-        personas=[persona[name] for name in non_egos],
-        failure_rates=matrix("failure_rate"),
-        ego_payoffs=matrix("ego_payoff"),
-        non_ego_payoffs=matrix("non_ego_payoff"),
-    )

@@ -9,18 +9,17 @@ and the safest mixture of egos, which uses failure rates only.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
-from harness.evaluation.game_theory.crossplay import Matrices, matrices
 from harness.evaluation.game_theory.dominance import dominated, safest_mixture
 from harness.evaluation.game_theory.nash import Equilibrium, regrets, solve
 from harness.evaluation.tables import table_of
-from harness.game.arrays import BoolArray
+from harness.game.arrays import FloatArray
 
 ALL = "all"
 """The game of every non-ego."""
@@ -37,6 +36,17 @@ class SolutionKind(str, Enum):
     """A strategy with an empty cell is not part of this game."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Game:
+    """The strategies that were measured against all of the other side, and their means [E, N]."""
+
+    egos: list[str]
+    non_egos: list[str]
+    failure_rates: FloatArray
+    ego_payoffs: FloatArray
+    non_ego_payoffs: FloatArray
+
+
 def equilibria(crossplay: pd.DataFrame) -> pd.DataFrame:
     """The solutions of every seed's games, the table `equilibria`, from a table of `crossplay`.
 
@@ -45,41 +55,52 @@ def equilibria(crossplay: pd.DataFrame) -> pd.DataFrame:
     """
     rows: list[dict[str, object]] = []
     for seed, found in crossplay.groupby("seed", sort=False):
-        table = matrices(found)
-        for persona in dict.fromkeys(filter(None, table.personas)):
-            places = [place for place, name in enumerate(table.personas) if name == persona]
-            for row in _nash(table.among(range(len(table.egos)), places)):
-                rows.append({"seed": seed, "game": persona, **row})
-        rows.extend({"seed": seed, "game": ALL, **row} for row in _safest(table))
+        for persona in dict.fromkeys(filter(None, found["persona"])):
+            game, left_out = _game(found, found["persona"] == persona, ["failure_rate", "ego_payoff", "non_ego_payoff"])
+            rows.extend({"seed": seed, "game": persona, **row} for row in (*_nash(game), *left_out))
+        game, left_out = _game(found, found["persona"].notna(), ["failure_rate", "ego_payoff"])
+        rows.extend({"seed": seed, "game": ALL, **row} for row in (*_safest(game), *left_out))
     return table_of("equilibria", rows)
 
 
-def _complete(table: Matrices, measured: BoolArray) -> tuple[Matrices, list[dict[str, object]]]:
-    """The part of a game whose cells [E, N] are all measured, and rows for the strategies left out."""
-    has_cells = [bool(column.any()) for column in measured.T]
-    egos = [place for place, row in enumerate(measured) if any(has_cells) and row[has_cells].all()]
-    non_egos = [place for place, has_cell in enumerate(has_cells) if egos and has_cell]
-    part = table.among(egos, non_egos)
-    left_out = [("ego", name) for name in table.egos if name not in part.egos]
-    left_out += [("non_ego", name) for name in table.non_egos if name not in part.non_egos]
-    return part, [{"solution": SolutionKind.NOT_PLAYED.value, "role": role, "player": name} for role, name in left_out]
+def _game(found: pd.DataFrame, asked: pd.Series, needed: Sequence[str]) -> tuple[_Game, list[dict[str, object]]]:
+    """The game of all egos and the non-egos of the rows that are asked for, as far as the needed columns are measured,
+    and rows for the strategies left out."""
+    egos, non_egos = found["ego"].unique(), found.loc[asked, "non_ego"].unique()
+    cells = found.set_index(["ego", "non_ego"])
+    tables = {
+        name: cells[name].unstack("non_ego").reindex(index=egos, columns=non_egos)
+        for name in ("failure_rate", "ego_payoff", "non_ego_payoff")
+    }
+    measured = pd.concat([tables[name].notna() for name in needed]).groupby(level=0, sort=False).all()
+    there = measured.any(axis=0)
+    complete = measured.loc[:, there].all(axis=1) & there.any()
+    there &= complete.any()
+    part = {name: table.loc[complete, there].to_numpy(float) for name, table in tables.items()}
+    left_out = [("ego", name) for name in egos[~complete]] + [("non_ego", name) for name in non_egos[~there]]
+    game = _Game(
+        egos=egos[complete].tolist(),
+        non_egos=non_egos[there].tolist(),
+        failure_rates=part["failure_rate"],
+        ego_payoffs=part["ego_payoff"],
+        non_ego_payoffs=part["non_ego_payoff"],
+    )
+    return game, [{"solution": SolutionKind.NOT_PLAYED.value, "role": role, "player": name} for role, name in left_out]
 
 
-def _nash(table: Matrices) -> Iterator[dict[str, Any]]:
-    measured = [np.isfinite(each) for each in (table.failure_rates, table.ego_payoffs, table.non_ego_payoffs)]
-    game, left_out = _complete(table, np.logical_and.reduce(measured))
-    if game.egos:
-        strategies = _strategies(game)
-        found = solve(game.ego_payoffs, game.non_ego_payoffs)
-        for number, each in enumerate(found, 1):
-            for strategy, cells in zip(strategies, _played(game, each), strict=True):
-                yield strategy | cells | {"solution": SolutionKind.NASH.value, "number": number}
-        if not found:
-            yield from (strategy | {"solution": SolutionKind.NOT_VERIFIED.value} for strategy in strategies)
-    yield from left_out
+def _nash(game: _Game) -> Iterator[dict[str, Any]]:
+    if not game.egos:
+        return
+    strategies = _strategies(game)
+    found = solve(game.ego_payoffs, game.non_ego_payoffs)
+    for number, each in enumerate(found, 1):
+        for strategy, cells in zip(strategies, _played(game, each), strict=True):
+            yield strategy | cells | {"solution": SolutionKind.NASH.value, "number": number}
+    if not found:
+        yield from (strategy | {"solution": SolutionKind.NOT_VERIFIED.value} for strategy in strategies)
 
 
-def _strategies(game: Matrices) -> list[dict[str, object]]:
+def _strategies(game: _Game) -> list[dict[str, object]]:
     """A row for each ego and non-ego of a game of two players, with the cells that are the same in every solution."""
     non_egos = zip(game.non_egos, dominated(game.non_ego_payoffs.T, game.non_egos), strict=True)
     rows = _egos(game)
@@ -87,7 +108,7 @@ def _strategies(game: Matrices) -> list[dict[str, object]]:
     return rows
 
 
-def _egos(game: Matrices) -> list[dict[str, object]]:
+def _egos(game: _Game) -> list[dict[str, object]]:
     in_payoff, in_failures = (dominated(each, game.egos) for each in (game.ego_payoffs, -game.failure_rates))
     return [
         {"role": "ego", "player": name, "dominated_in_payoff": payoff, "dominated_in_failures": failures}
@@ -95,7 +116,7 @@ def _egos(game: Matrices) -> list[dict[str, object]]:
     ]
 
 
-def _played(game: Matrices, at: Equilibrium) -> Iterator[dict[str, float]]:
+def _played(game: _Game, at: Equilibrium) -> Iterator[dict[str, float]]:
     """The cells of each ego, then of each non-ego, in an equilibrium."""
     x, y = at.ego_shares, at.non_ego_shares
     ego_regret, non_ego_regret = regrets(game.ego_payoffs, game.non_ego_payoffs, at)
@@ -114,14 +135,13 @@ def _played(game: Matrices, at: Equilibrium) -> Iterator[dict[str, float]]:
             }
 
 
-def _safest(table: Matrices) -> Iterator[dict[str, object]]:
-    game, left_out = _complete(table, np.isfinite(table.failure_rates) & np.isfinite(table.ego_payoffs))
-    if game.egos:
-        shares = safest_mixture(game.failure_rates)
-        against = shares @ game.failure_rates
-        kind = {"solution": SolutionKind.SAFEST.value, "solution_failure_rate": float(against.max())}
-        for row, share, rates in zip(_egos(game), shares, game.failure_rates, strict=True):
-            yield kind | row | {"share": share, "failure_rate": rates.max()}
-        for name, rate in zip(game.non_egos, against, strict=True):
-            yield kind | {"role": "non_ego", "player": name, "failure_rate": rate}
-    yield from left_out
+def _safest(game: _Game) -> Iterator[dict[str, object]]:
+    if not game.egos:
+        return
+    shares = safest_mixture(game.failure_rates)
+    against = shares @ game.failure_rates
+    kind = {"solution": SolutionKind.SAFEST.value, "solution_failure_rate": float(against.max())}
+    for row, share, rates in zip(_egos(game), shares, game.failure_rates, strict=True):
+        yield kind | row | {"share": share, "failure_rate": rates.max()}
+    for name, rate in zip(game.non_egos, against, strict=True):
+        yield kind | {"role": "non_ego", "player": name, "failure_rate": rate}

@@ -2,11 +2,10 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import pytest
 
 from harness.evaluation.columns import TABLES
-from harness.evaluation.game_theory.crossplay import Pairing, crossplay, matrices
+from harness.evaluation.game_theory.crossplay import Pairing, crossplay
 from tests.support.game_tables import arm, table
 
 NAIVE = Pairing(arm="naive_vs_speedy", seed=1, ego="naive", non_ego="speedy", persona="speedy")
@@ -48,25 +47,3 @@ def test_crossplay__unmeasured_values_are_empty_and_unplayed_games_are_counted()
 def test_crossplay__a_pairing_twice_is_refused():
     with pytest.raises(ValueError, match="are paired twice"):
         rows([NAIVE, NAIVE], arm("naive_vs_speedy", ego_failed=[0]))
-
-
-def test_matrices__have_egos_as_rows_and_an_empty_cell_where_nothing_was_played():
-    found = matrices(
-        crossplay(
-            [NAIVE, RETRAINED, SUMO],
-            table(
-                arm("naive_vs_speedy", ego_failed=[1, 0]),
-                arm("retrained_vs_speedy", ego_failed=[0, 0], ego_payoff=[3, 5]),
-                arm("naive_vs_sumo", ego_failed=[0, 0]),
-            ),
-        )
-    )
-    assert (found.egos, found.non_egos, found.personas) == (
-        ["naive", "retrained_speedy"],
-        ["speedy", "sumo"],
-        ["speedy", ""],
-    )
-    np.testing.assert_equal(found.failure_rates, [[0.5, 0], [0, math.nan]])
-    np.testing.assert_equal(found.ego_payoffs, [[10, 10], [4, math.nan]])
-    part = found.among([1], [0])
-    assert (part.egos, part.non_egos, part.ego_payoffs.tolist()) == (["retrained_speedy"], ["speedy"], [[4]])
