@@ -43,8 +43,6 @@ class RecordedGame:
     world: World
     kinds: Mapping[str, BodyKind]
 
-    # --- bodies ----------------------------------------------------------------------------------------------------
-
     @cached_property
     def obstacles(self) -> tuple[str, ...]:
         """The names of the obstacles, in the order of the scene."""
@@ -86,8 +84,6 @@ class RecordedGame:
         others = [body for body in np.flatnonzero(self.bodies.present[step]).tolist() if body != player]
         own = self.box(step, player)
         return min(others, key=lambda body: box_distance(own, self.box(step, body)), default=None)
-
-    # --- players ---------------------------------------------------------------------------------------------------
 
     @cached_property
     def outcomes(self) -> tuple[Outcome, ...]:
@@ -154,8 +150,6 @@ class RecordedGame:
     def while_driving(self, values: NDArray, player: int) -> NDArray:
         """[N] the values [T, P] of a player in the steps that it drove, without the start."""
         return np.asarray(values[1:][self.drove[1:, player], player])
-
-    # --- reading the trace -----------------------------------------------------------------------------------------
 
     @cached_property
     def _places(self) -> tuple[IntArray, IntArray]:

@@ -1,23 +1,4 @@
-"""Strategies and arms as records. Their names in tables, files and stages are derived here and nowhere else.
-
-| strategy | name |
-| --- | --- |
-| the ego as it is before round 2 | `naive` |
-| the ego retrained against a persona or population | `retrained_speedy`, from round 4 on `retrained_speedy_round4` |
-| the external ego with parameters searched against a persona or population | `reconfigured_speedy` |
-| the ego retrained against several personas at once | `robust` |
-| another driver in the cross-play | the name of its document or folder |
-| a persona's non-ego, or a population | `speedy`, from round 3 on `speedy_round3` |
-| SUMO's own driver as non-ego | `sumo` |
-| the k-th training of a player's best response | `naive_vs_speedy_ego_response1` |
-
-| arm | name |
-| --- | --- |
-| the ego alone | `naive_alone`; of round 2 `retrained_alone_speedy` |
-| the non-ego alone | `speedy_alone` |
-| both | `naive_vs_speedy`; the retrained ego against the persona of its training `retrained_vs_speedy` |
-| with one player replaced by its best response | `naive_vs_speedy_ego_response` |
-"""
+"""Strategies and arms as records. Their names in tables, files and stages are derived here and nowhere else."""
 
 from __future__ import annotations
 

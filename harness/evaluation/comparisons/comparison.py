@@ -26,7 +26,7 @@ pairs and a mean difference, which describe the games, and no test. They are not
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -144,7 +144,7 @@ def _row(question: Question, metric: str, games: Mapping[Any, pd.DataFrame], clo
     row = vars(question) | vars(closed) | {"metric": metric, "pairs": len(low), "pairs_left_out": left_out}
     row |= paired_t_test(low, high, closed)
     if not closed.reason and metric == "failure" and len(low) >= 2:
-        row["mcnemar_p"] = _mcnemar(low, high)
+        row["mcnemar_p"] = mcnemar(high - low, "greater")
     return row
 
 
@@ -211,8 +211,7 @@ def _all_equal(values: FloatArray, largest: float) -> bool:
     return bool(np.ptp(values) <= ROUNDING * largest or values.std(ddof=1) == 0)
 
 
-def _mcnemar(low: FloatArray, high: FloatArray) -> float:
-    in_favour, against = int((high > low).sum()), int((high < low).sum())
-    if in_favour + against == 0:
-        return 1.0
-    return float(scipy.stats.binomtest(in_favour, in_favour + against, 0.5, alternative="greater").pvalue)
+def mcnemar(differences: FloatArray, alternative: Literal["greater", "two-sided"]) -> float:
+    """The p-value of McNemar's exact test of differences [N] of failures; 1 where no pair differs."""
+    more, fewer = int((differences > 0).sum()), int((differences < 0).sum())
+    return float(scipy.stats.binomtest(more, more + fewer, 0.5, alternative).pvalue) if more + fewer else 1.0

@@ -15,11 +15,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
-from scipy import stats
+import scipy
 
 from harness.evaluation.comparisons.comparison import (
     games_by_arm,
     holm,
+    mcnemar,
     mean_cells,
     mean_interval,
     measured_values,
@@ -93,7 +94,11 @@ def _difference(measure: str, column: str, runs: tuple[pd.DataFrame, pd.DataFram
     pairs = pd.concat(sides, axis=1).dropna().to_numpy() if paired else np.zeros((0, 2))
     differences = pairs[:, 1] - pairs[:, 0]
     low, high = mean_interval(differences)
-    p_value = _p_value(measure, differences)
+    p_value = np.nan
+    if measure in RATES and len(pairs):
+        p_value = mcnemar(differences, "two-sided")
+    elif np.isfinite(low):
+        p_value = float(scipy.stats.ttest_1samp(differences, 0.0).pvalue)
     return Difference(
         measure=measure,
         arm=str(runs[0]["arm"].iloc[0]),
@@ -112,12 +117,3 @@ def _difference(measure: str, column: str, runs: tuple[pd.DataFrame, pd.DataFram
 def _side(measure: str, values: FloatArray) -> Side:
     cells = rate_cells("value", values.sum(), len(values)) if measure in RATES else mean_cells("value", values)
     return Side(value=cells["value"], low=cells["value_low"], high=cells["value_high"], games=len(values))
-
-
-def _p_value(measure: str, differences: FloatArray) -> float:
-    """Of the differences of pairs; NaN without a test."""
-    if measure in RATES and len(differences):
-        more, fewer = int((differences > 0).sum()), int((differences < 0).sum())
-        return float(stats.binomtest(more, more + fewer, 0.5).pvalue) if more + fewer else 1.0
-    has_spread = np.isfinite(mean_interval(differences)[0])
-    return float(stats.ttest_1samp(differences, 0.0).pvalue) if has_spread else np.nan

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -51,8 +52,7 @@ class Cause:
     ego_broke: str = ""
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Event:
+class _Event(NamedTuple):
     """What led to the failure, and the step in which it began."""
 
     step: int
@@ -75,7 +75,8 @@ def cause_of(course: Course) -> Cause | None:
     players = course.drove.shape[1]
     broke = {player: _broken(course, player, last) for player in {EGO, other} if player < players}
     name, words = broke.get(other, ("", ""))
-    event = _Event(step=event.step, name=name or event.name, words=_joined(name, words, event.words))
+    if name:
+        event = _Event(event.step, name, words if name in _SAY_IT_ALL else f"{words} and {event.words}")
     seen = _seen(course, other, event.step, last)
     reaction, braking_mps2 = _reaction(course, event.step, last)
     return Cause(
@@ -115,17 +116,16 @@ def _event(course: Course, other: int, last: int) -> _Event:
     lane = in_lane(course, other, EGO)
     first = max(last - course.steps(at.SINCE_S), 0)
     if not lane.inside[last]:
-        return _Event(step=_danger(course, other, last), name="leaves_lane", words="the ego leaves its lane towards it")
+        return _Event(_danger(course, other, last), "leaves_lane", "the ego leaves its lane towards it")
     outside = np.flatnonzero(~lane.inside[first:last])
     entered = first + int(outside[-1]) + 1 if len(outside) else 0
     if len(outside) and lane.changes_lane(entered):
-        words = f"the ego changes into its lane, to the {lane.side(entered)}"
-        return _Event(step=entered, name="changes_lane", words=words)
+        return _Event(entered, "changes_lane", f"the ego changes into its lane, to the {lane.side(entered)}")
     for name, span in reversed(list(entries(course, other, EGO))):
         if first < span.first <= last:
-            return _Event(step=span.first, name=name, words=words_of(name, lane.side(span.first)))
+            return _Event(span.first, name, words_of(name, lane.side(span.first)))
     name, words = _in_lane(course, other, last)
-    return _Event(step=_danger(course, other, last), name=name, words=words)
+    return _Event(_danger(course, other, last), name, words)
 
 
 def _drifts_beside(course: Course, last: int) -> tuple[int | None, _Event | None]:
@@ -138,7 +138,7 @@ def _drifts_beside(course: Course, last: int) -> tuple[int | None, _Event | None
             away_m = box_distance(course.game.box(step, EGO), course.game.box(step, player))
             near = away_m <= at.CUT_IN_TIME_GAP_S * course.quantities.speed_mps[step, EGO]
             if near and span.first > latest and span.last >= first:
-                latest, found = span.first, (player, _Event(step=span.first, name="drift", words=span.text))
+                latest, found = span.first, (player, _Event(span.first, "drift", span.text))
     return found
 
 
@@ -174,11 +174,6 @@ def _broken(course: Course, player: int, last: int) -> tuple[str, str]:
             if any(span.first <= last and span.last >= first for span in rule(course, player)):
                 return name, words
     return "", ""
-
-
-def _joined(name: str, broken: str, deed: str) -> str:
-    """What a road user did, with the rule that it broke. Some rules say it all."""
-    return deed if not name else broken if name in _SAY_IT_ALL else f"{broken} and {deed}"
 
 
 def _reaction(course: Course, begin: int, last: int) -> tuple[str, float]:

@@ -64,8 +64,6 @@ class Course:
         ttc = self.quantities.time_to_collision_s[first : last + 1, player].min()
         return Span(first=first, last=last, gap_m=float(gap), ttc_s=float(ttc), text=text)
 
-    # --- the end of the ego's game ----------------------------------------------------------------------------------
-
     @cached_property
     def involved(self) -> int | None:
         """The road user that the ego touches. Where it leaves the road, the player with which it was on a collision
@@ -86,8 +84,6 @@ class Course:
         """Whether what a body did to the ego in a step is in time to be the cause of the ego's failure."""
         last = self.game.last_step(EGO)
         return of == EGO and body == self.involved and last is not None and last - step < self.steps(at.SINCE_S)
-
-    # --- time -------------------------------------------------------------------------------------------------------
 
     @property
     def step_s(self) -> float:
@@ -116,8 +112,6 @@ class Course:
         steps = np.flatnonzero(self.drove[:, player])
         end_s = float(steps[-1]) * self.step_s if len(steps) else -np.inf
         return [each for each in self.game.encounters[player] if each.own.enters_s <= end_s]
-
-    # --- across the road ------------------------------------------------------------------------------------------
 
     @cached_property
     def _from_lane_m(self) -> FloatArray:
@@ -151,8 +145,6 @@ class Course:
         curve = (side * np.diff(headings, axis=-1) / np.diff(PATH_M[near])).max(-1)
         own = side * self.quantities.lateral_acceleration_mps2[:, player]
         return own - np.maximum(curve, 0.0) * self.quantities.speed_mps[:, player] ** 2
-
-    # --- relative to another body ----------------------------------------------------------------------------------
 
     def ahead_m(self, body: int, of: int) -> FloatArray:
         """[T] how far the centre of a body is ahead of that of player `of`, along the player's route."""
