@@ -143,13 +143,7 @@ class Acceptance(Document):
     @property
     def bounds(self) -> dict[str, float]:
         """The bounds that are given, by their keys."""
-        values = self.model_dump(exclude={"ego"}, exclude_none=True)
-        return {name: float(value) for name, value in values.items()}
-
-    @property
-    def needs_gaps(self) -> bool:
-        """Whether a bound needs the table [best_response]."""
-        return self.gap_share is not None
+        return self.model_dump(exclude={"ego"}, exclude_none=True)
 
     @model_validator(mode="after")
     def _bounds_something(self) -> Acceptance:
@@ -202,21 +196,27 @@ class Campaign(Document):
         if self.policies is not None and (unused := self._unused_tables()):
             message = "with `policies` nothing is trained: this table would be ignored"
             raise Mistakes([(name, message, "leave out this table or `policies`") for name in unused])
-        measures_gaps, learns = self.best_response is not None, self.ego.driver == LEARNED
-        add = "add [best_response] or leave out this key"
+        bounds = self.acceptance.bounds if self.acceptance is not None else {}
         leave_out = "leave out this key, or set ego.driver to 'learned'"
-        if self.rounds.stop_early and not measures_gaps:
-            raise Mistakes([("rounds.stop_early", "without [best_response], no equilibrium can be found", add)])
-        if self.acceptance is not None and self.acceptance.needs_gaps and not measures_gaps:
-            raise Mistakes([("acceptance.gap_share", "without [best_response], no gap is measured", add)])
-        prevents = self.acceptance is not None and self.acceptance.preventable_failure_rate is not None
-        if prevents and not self.assessment.reference_drivers:
+        mistakes = []
+        if self.best_response is None:
+            add = "add [best_response] or leave out this key"
+            if self.rounds.stop_early:
+                mistakes.append(("rounds.stop_early", "without [best_response], no equilibrium can be found", add))
+            if "gap_share" in bounds:
+                mistakes.append(("acceptance.gap_share", "without [best_response], no gap is measured", add))
+        if "preventable_failure_rate" in bounds and not self.assessment.reference_drivers:
             message = "with assessment.reference_drivers = false, it is not judged which failures are preventable"
-            raise Mistakes([("acceptance.preventable_failure_rate", message, "leave out one of these keys")])
-        if not learns and self.rounds.count > Rounds().count:
-            raise Mistakes([("rounds.count", "the ego does not learn, so there are no further rounds", leave_out)])
-        if not learns and self.retraining.against:
-            raise Mistakes([("retraining.against", "an ego that does not learn can't be retrained", leave_out)])
+            mistakes.append(("acceptance.preventable_failure_rate", message, "leave out one of these keys"))
+        if self.ego.driver != LEARNED:
+            if self.rounds.count > Rounds().count:
+                message = "the ego does not learn, so there are no further rounds"
+                mistakes.append(("rounds.count", message, leave_out))
+            if self.retraining.against:
+                message = "an ego that does not learn can't be retrained"
+                mistakes.append(("retraining.against", message, leave_out))
+        if mistakes:
+            raise Mistakes(mistakes)
         return self
 
     def _unused_tables(self) -> list[str]:

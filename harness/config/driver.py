@@ -21,6 +21,7 @@ OUTPUTS = ("acceleration_mps2", "steering_rad")
 """The outputs of a driver that uses SI units."""
 
 Argument = Annotated[str, Field(max_length=2000, pattern=r"^[^\x00]*$")]
+KIND = Field(description="The kind of driver, which determines the other keys.")
 VariableName = Annotated[str, Field(min_length=1, max_length=200)]
 PedalsAndWheel = Annotated[list[Annotated[float, Field(ge=-1.0, le=1.0)]], Field(min_length=2, max_length=2)]
 DeadlineS = Annotated[float, Field(gt=0.0, le=600.0)]
@@ -29,8 +30,7 @@ DeadlineS = Annotated[float, Field(gt=0.0, le=600.0)]
 class Sumo(Document):
     """SUMO's own models, as a vehicle type in the route file of the scene configures them."""
 
-    kind: Literal["sumo"]
-    """The kind of driver, which determines the other keys."""
+    kind: Literal["sumo"] = KIND
     vehicle_type: Annotated[str, Field(min_length=1, max_length=200)]
     """The id of a `vType`. The ego is a car of this type, with its size and top speed."""
 
@@ -57,8 +57,7 @@ class Process(Adjustable, WithFiles):
 
     parameter_table: ClassVar[str] = "parameters"
 
-    kind: Literal["process"]
-    """The kind of driver, which determines the other keys."""
+    kind: Literal["process"] = KIND
     command: list[Argument] = Field(min_length=1, max_length=100)
     """The program and its arguments. It runs in `folder`; a name without `/` is searched on PATH."""
     folder: DocumentPath = "."
@@ -81,8 +80,7 @@ class Fmu(Adjustable, WithFiles):
     keys_of_files: ClassVar[tuple[str, ...]] = ("file",)
     parameter_table: ClassVar[str] = "start"
 
-    kind: Literal["fmu"]
-    """The kind of driver, which determines the other keys."""
+    kind: Literal["fmu"] = KIND
     file: DocumentPath
     """The FMU, relative to this document's folder."""
     inputs: dict[VariableName, str] = Field({}, max_length=200)
@@ -121,8 +119,7 @@ class StableBaselines3(WithFiles):
 
     keys_of_files: ClassVar[tuple[str, ...]] = ("file", "normalize")
 
-    kind: Literal["stable_baselines3"]
-    """The kind of driver, which determines the other keys."""
+    kind: Literal["stable_baselines3"] = KIND
     file: DocumentPath
     """The `.zip` file that the model's `save` wrote, relative to this document's folder."""
     algorithm: Literal["PPO", "A2C", "SAC", "TD3", "DDPG", "DQN", "TQC", "RecurrentPPO"]
@@ -151,8 +148,7 @@ class Network(WithFiles):
 class Onnx(Network):
     """A network in the ONNX format, run by ONNX Runtime."""
 
-    kind: Literal["onnx"]
-    """The kind of driver, which determines the other keys."""
+    kind: Literal["onnx"] = KIND
     input: VariableName | None = None
     """The input that receives the observation; none: the only input that is not called `noise`."""
     output: VariableName | None = None
@@ -162,8 +158,7 @@ class Onnx(Network):
 class TorchScript(Network):
     """A module that `torch.jit.save` wrote."""
 
-    kind: Literal["torchscript"]
-    """The kind of driver, which determines the other keys."""
+    kind: Literal["torchscript"] = KIND
 
 
 class Python(Adjustable, WithFiles):
@@ -171,8 +166,7 @@ class Python(Adjustable, WithFiles):
 
     parameter_table: ClassVar[str] = "parameters"
 
-    kind: Literal["python"]
-    """The kind of driver, which determines the other keys."""
+    kind: Literal["python"] = KIND
     entry_point: Annotated[str, Field(min_length=1, max_length=200)]
     """The name of the entry point, as the package declares it."""
     parameters: dict[str, Any] = Field({}, max_length=1000)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from pydantic import Field, field_validator, model_validator
+from typing import Annotated
 
-from harness.config.toml_reading import Document, Interval
+from pydantic import AfterValidator, Field, model_validator
 
-LONGEST_DELAY_S = 5.0
+from harness.config.toml_reading import Document, ordered
+
+_DelayS = Annotated[float, Field(ge=0.0, le=5.0)]
 
 
 class AttentionLapses(Document):
@@ -14,7 +16,7 @@ class AttentionLapses(Document):
 
     mean_attentive_s: float = Field(gt=0.1, le=3600.0)
     """Mean time between lapses (exponential distribution)."""
-    lapse_s: Interval
+    lapse_s: Annotated[tuple[Annotated[float, Field(gt=0.0)], float], AfterValidator(ordered)]
     """Range of the length of a lapse (uniform distribution). In a lapse the policy's actions are omitted: pedals and
     wheel are released."""
     crown_steering_rad: float = Field(0.0, ge=0.0, le=0.1)
@@ -22,27 +24,13 @@ class AttentionLapses(Document):
     bump_steering_sd_rad: float = Field(0.0, ge=0.0, le=0.1)
     """Standard deviation, from lapse to lapse, of the steering angle that bumps and the car's own pull add to it."""
 
-    @field_validator("lapse_s")
-    @classmethod
-    def _positive(cls, lapse_s: tuple[float, float]) -> tuple[float, float]:
-        if lapse_s[0] <= 0.0:
-            raise ValueError("a lapse must last longer than 0 s")
-        return lapse_s
-
 
 class ReactionTime(Document):
     """How late decisions reach pedals and wheel, in the training of the person as well."""
 
-    delay_s: Interval
+    delay_s: Annotated[tuple[_DelayS, _DelayS], AfterValidator(ordered)]
     """Range of the delay (uniform distribution, drawn for each drive), within 0 to 5 s. Until the first decision
     arrives, the car coasts straight on."""
-
-    @field_validator("delay_s")
-    @classmethod
-    def _possible(cls, delay_s: tuple[float, float]) -> tuple[float, float]:
-        if not 0.0 <= delay_s[0] <= delay_s[1] <= LONGEST_DELAY_S:
-            raise ValueError(f"the delay must be between 0 and {LONGEST_DELAY_S:g} s")
-        return delay_s
 
 
 class Perception(Document):
@@ -73,12 +61,8 @@ class Perception(Document):
 
     @model_validator(mode="after")
     def _nothing_is_ignored(self) -> Perception:
-        if self.looked_but_failed_to_see_share and self.noticed_within_m is None:
-            raise ValueError("looked_but_failed_to_see_share has no effect without noticed_within_m: add the distance")
-        if self.noticed_within_m is not None and not self.looked_but_failed_to_see_share:
-            raise ValueError(
-                "noticed_within_m has no effect without looked_but_failed_to_see_share: add the share of the drives"
-            )
+        if bool(self.looked_but_failed_to_see_share) != (self.noticed_within_m is not None):
+            raise ValueError("looked_but_failed_to_see_share and noticed_within_m have no effect alone: give both")
         return self
 
 

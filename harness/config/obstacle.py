@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, TypeAlias, get_args
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from harness.config.toml_reading import Document, Interval
+from harness.config.toml_reading import Document, ordered
 
 Kind: TypeAlias = Literal[
     "car", "van", "truck", "bus", "broken_down_car", "cone", "debris", "wall", "closed_lane", "building"
@@ -24,9 +24,6 @@ USUAL_SIZE_M = {
     "debris": (1.0, 0.5),
 }
 """Length and width by kind: of vehicles, SUMO's for its classes (passenger, delivery, truck, bus)."""
-HIDING = ("van", "truck", "bus", "wall", "building")
-"""Kinds that are higher than eyes, and hide what is behind them."""
-_FARTHEST_M = 1e7
 
 
 def _as_range(value: Any) -> Any:
@@ -36,21 +33,14 @@ def _as_range(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
 
-def _possible(value: tuple[float, float]) -> tuple[float, float]:
-    if max(abs(value[0]), abs(value[1])) > _FARTHEST_M:
-        raise ValueError(f"lies outside -{_FARTHEST_M:g} to {_FARTHEST_M:g}")
-    return value
-
-
+_Place = Annotated[float, Field(ge=-1e7, le=1e7)]
+Corner = tuple[_Place, _Place]
 NumberOrRange = Annotated[
-    Interval,
+    Corner,
+    AfterValidator(ordered),
     BeforeValidator(_as_range, json_schema_input_type=float | tuple[float, float]),
-    AfterValidator(_possible),
 ]
 """A number, or a range from which each game draws by its seed; read as a range."""
-Corner = tuple[
-    Annotated[float, Field(ge=-_FARTHEST_M, le=_FARTHEST_M)], Annotated[float, Field(ge=-_FARTHEST_M, le=_FARTHEST_M)]
-]
 
 
 class Obstacle(Document):
@@ -81,48 +71,35 @@ class Obstacle(Document):
     """Of a building: its corners [x, y] in the net's coordinates, in order. Two corners are a wall."""
 
     @model_validator(mode="after")
-    def _one_place(self) -> Obstacle:
-        on_lane = [name for name in ("lane", "position_m") if getattr(self, name) is not None]
-        at_point = [name for name in ("x_m", "y_m", "heading_deg") if getattr(self, name) is not None]
+    def _has_a_place_and_a_size(self) -> Obstacle:
+        given = {name for name in self.model_fields_set - {"kind"} if getattr(self, name) is not None}
         if self.kind == "building":
-            self._check_building([*on_lane, *at_point])
+            if "outline" not in given:
+                raise ValueError("a building needs its outline; a wall on the road is a wall")
+            if surplus := sorted(given - {"outline"}):
+                raise ValueError(f"a building is where its outline is: leave out {surplus[0]}")
             return self
-        if self.outline is not None:
+        if "outline" in given:
             raise ValueError(f"only a building has an outline; give a {self.kind} a lane or x_m, y_m and heading_deg")
-        if bool(on_lane) == bool(at_point):
+        on_lane, at_point, relative = {"lane", "position_m"}, {"x_m", "y_m", "heading_deg"}, {"offset_m", "turned_deg"}
+        if bool(given & on_lane) == bool(given & at_point):
             raise ValueError("give either lane and position_m, or x_m, y_m and heading_deg")
-        if len(on_lane) == 1 or 0 < len(at_point) < 3:
-            missing = "lane and position_m" if on_lane else "x_m, y_m and heading_deg"
+        if not (on_lane <= given or at_point <= given):
+            missing = "lane and position_m" if given & on_lane else "x_m, y_m and heading_deg"
             raise ValueError(f"has a part of its place: give {missing}")
-        if at_point and {"offset_m", "turned_deg"} & self.model_fields_set:
+        if given & at_point and given & relative:
             raise ValueError("offset_m and turned_deg are relative to a lane: leave them out, or give lane")
-        return self
-
-    @model_validator(mode="after")
-    def _has_a_size(self) -> Obstacle:
-        if self.kind == "closed_lane":
-            if self.lane is None:
-                raise ValueError("a closed_lane needs its lane")
-            if self.width_m is not None or {"offset_m", "turned_deg"} & self.model_fields_set:
-                raise ValueError("a closed_lane fills its lane: leave out width_m, offset_m and turned_deg")
-        needed = {"closed_lane": ("length_m",), "wall": ("length_m", "width_m")}.get(self.kind, ())
-        for name in needed:
-            if getattr(self, name) is None:
+        if self.kind == "closed_lane" and (given & (relative | {"width_m"}) or self.lane is None):
+            raise ValueError("a closed_lane fills its lane: give lane, and leave out width_m, offset_m and turned_deg")
+        for name in {"closed_lane": ("length_m",), "wall": ("length_m", "width_m")}.get(self.kind, ()):
+            if name not in given:
                 raise ValueError(f"a {self.kind} needs its {name}")
         return self
 
-    def _check_building(self, placed: list[str]) -> None:
-        if self.outline is None:
-            raise ValueError("a building needs its outline; a wall on the road is a wall")
-        surplus = [*placed, *(name for name in ("length_m", "width_m") if getattr(self, name) is not None)]
-        surplus += sorted({"offset_m", "turned_deg"} & self.model_fields_set)
-        if surplus:
-            raise ValueError(f"a building is where its outline is: leave out {surplus[0]}")
-
     @property
     def is_hiding(self) -> bool:
-        """Whether it hides what is behind it."""
-        return self.kind in HIDING
+        """Whether it is higher than eyes, and hides what is behind it."""
+        return self.kind in ("van", "truck", "bus", "wall", "building")
 
     @property
     def turned_rad(self) -> tuple[float, float]:

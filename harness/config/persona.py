@@ -17,8 +17,7 @@ from harness.game.payoff import Payoff, Weighted
 from harness.game.payoff_terms import FUZZY_QUANTITIES, GROUPS, NEARNESS, TERMS
 
 Weight = Annotated[float, Field(ge=0.0, le=1000.0)]
-Input = Annotated[float, Field(ge=-1e6, le=1e6)]
-Membership = Annotated[float, Field(ge=0.0, le=1.0)]
+Point = tuple[Annotated[float, Field(ge=-1e6, le=1e6)], Annotated[float, Field(ge=0.0, le=1.0)]]
 
 
 class Source(Document):
@@ -47,8 +46,7 @@ class Parametrised(Document):
     @property
     def limits(self) -> dict[str, float]:
         """The limits that are given, by name."""
-        names = (name for name in type(self).model_fields if name != "weight")
-        return {name: value for name in names if (value := getattr(self, name)) is not None}
+        return self.model_dump(exclude={"weight"}, exclude_none=True)
 
 
 WeightOrTable = Annotated[
@@ -71,7 +69,7 @@ class MembershipFunction(Document):
 
     name: Name
     """The name of the set."""
-    points: list[tuple[Input, Membership]] = Field(min_length=1, max_length=20)
+    points: list[Point] = Field(min_length=1, max_length=20)
     """Points [input in the unit of the quantity, membership], with increasing inputs."""
     value: float = Field(ge=-1000.0, le=1000.0)
     """Payoff per second at full membership."""
@@ -83,12 +81,6 @@ class MembershipFunction(Document):
         if inputs != sorted(set(inputs)):
             raise ValueError("the inputs of the points must increase")
         return points
-
-    @property
-    def fuzzy_set(self) -> FuzzySet:
-        """The set as the game uses it."""
-        inputs, memberships = zip(*self.points, strict=True)
-        return FuzzySet(name=self.name, inputs=inputs, memberships=memberships, value=self.value)
 
 
 class FuzzyTerm(Document):
@@ -133,7 +125,11 @@ class FuzzyTerm(Document):
     @property
     def function(self) -> FuzzyFunction:
         """The function of the quantity."""
-        return FuzzyFunction(quantity=self.quantity, sets=tuple(each.fuzzy_set for each in self.sets))
+        sets = []
+        for each in self.sets:
+            inputs, memberships = zip(*each.points, strict=True)
+            sets.append(FuzzySet(name=each.name, inputs=inputs, memberships=memberships, value=each.value))
+        return FuzzyFunction(quantity=self.quantity, sets=tuple(sets))
 
 
 class Human(Group):
@@ -141,13 +137,6 @@ class Human(Group):
 
     fuzzy: list[FuzzyTerm] = Field(default_factory=list, max_length=50)
     """Terms defined by membership functions."""
-
-
-def _has_limit(value: float | Parametrised, limit: str) -> bool:
-    """Whether the value of a term has exactly this limit; an empty name stands for no limit."""
-    if isinstance(value, Parametrised):
-        return set(value.limits) == {limit}
-    return not limit
 
 
 class Persona(Document):
@@ -173,9 +162,11 @@ class Persona(Document):
     def _terms_are_valid(self) -> Persona:
         mistakes = [mistake for group in GROUPS for mistake in self._mistakes_in(group)]
         names = [each.name for each in self.human.fuzzy]
-        for k, name in enumerate(names):
-            if name in names[:k]:
-                mistakes.append((f"human.fuzzy[{k}].name", f"{name!r} occurs twice", "give each term its own name"))
+        mistakes += [
+            (f"human.fuzzy[{k}].name", f"{name!r} occurs twice", "give each term its own name")
+            for k, name in enumerate(names)
+            if name in names[:k]
+        ]
         if mistakes:
             raise Mistakes(mistakes)
         if not any(getattr(self, group).terms for group in GROUPS) and not self.human.fuzzy:
@@ -186,14 +177,14 @@ class Persona(Document):
         """Key, message and remedy of each mistake in the terms of a group."""
         known = [name for name, term in TERMS.items() if term.group == group]
         for name, value in getattr(self, group).terms.items():
-            key = f"{group}.terms.{name}"
-            if name not in TERMS:
+            key, term = f"{group}.terms.{name}", TERMS.get(name)
+            limits = [*value.limits] if isinstance(value, Parametrised) else [""]
+            if term is None:
                 yield key, f"unknown {group} term", nearest(name, known)
-            elif name not in known:
-                right = TERMS[name].group
-                yield key, f"belongs to the {right} terms", f"move it to [{right}.terms]"
-            elif not _has_limit(value, limit := TERMS[name].parameter):
-                remedy = f"{{ weight = ..., {limit} = ... }}" if limit else "a plain weight"
+            elif term.group != group:
+                yield key, f"belongs to the {term.group} terms", f"move it to [{term.group}.terms]"
+            elif limits != [term.parameter]:
+                remedy = f"{{ weight = ..., {term.parameter} = ... }}" if term.parameter else "a plain weight"
                 yield key, "has the wrong form", f"give {remedy}"
 
     @property

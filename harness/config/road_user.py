@@ -10,7 +10,6 @@ from pydantic import Field
 from harness.config.toml_reading import Document
 
 Kind = Literal["car", "truck", "motorcycle", "bicycle", "e_scooter", "pedestrian"]
-TWO_WHEELERS = ("motorcycle", "bicycle", "e_scooter")
 CYCLING = ("bicycle", "e_scooter")
 """The kinds that use lanes for bicycles."""
 
@@ -44,28 +43,22 @@ class Actuators(Document):
         return DEFAULTS[kind].model_copy(update=given)
 
 
+_BICYCLE = Actuators(
+    max_acceleration_mps2=1.2,
+    max_braking_mps2=3.1,
+    max_steering_rad=0.8,
+    max_steering_rate_radps=0.6,
+    wheelbase_m=1.05,
+    max_lateral_mps2=3.6,
+)
 DEFAULTS: Mapping[str, Actuators] = {
     "car": Actuators(),
     "truck": Actuators(max_acceleration_mps2=1.3, max_braking_mps2=6.0, max_steering_rate_radps=0.5, wheelbase_m=4.5),
     "motorcycle": Actuators(
         max_acceleration_mps2=5.0, wheelbase_m=1.4, max_steering_rate_radps=2.0, max_lateral_mps2=6.9
     ),
-    "bicycle": Actuators(
-        max_acceleration_mps2=1.2,
-        max_braking_mps2=3.1,
-        max_steering_rad=0.8,
-        max_steering_rate_radps=0.6,
-        wheelbase_m=1.05,
-        max_lateral_mps2=3.6,
-    ),
-    "e_scooter": Actuators(
-        max_acceleration_mps2=1.2,
-        max_braking_mps2=3.1,
-        max_steering_rad=0.8,
-        max_steering_rate_radps=0.6,
-        wheelbase_m=0.9,
-        max_lateral_mps2=3.6,
-    ),
+    "bicycle": _BICYCLE,
+    "e_scooter": _BICYCLE.model_copy(update={"wheelbase_m": 0.9}),
     "pedestrian": Actuators(
         max_acceleration_mps2=2.3,
         max_braking_mps2=2.3,

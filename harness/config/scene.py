@@ -9,17 +9,12 @@ from pydantic import AfterValidator, Field, model_validator
 
 from harness.config.obstacle import Obstacle
 from harness.config.road_user import CYCLING, WALKER_RUN_MPS, Actuators, Kind
-from harness.config.toml_reading import Document, Interval, Mistakes
+from harness.config.toml_reading import Document, Interval, Mistakes, ordered
 from harness.game.roles import MOST_PEOPLE, roles_of
 
-
-def _positive(interval: tuple[float, float]) -> tuple[float, float]:
-    if interval[0] < 0.0 or not 0.0 < interval[1] <= _LARGEST:
-        raise ValueError(f"the range lies outside 0 to {_LARGEST:g}")
-    return interval
-
-
-_LARGEST = 10.0
+_Lower = Annotated[float, Field(ge=0.0, le=10.0)]
+_Upper = Annotated[float, Field(gt=0.0, le=10.0)]
+Factors = Annotated[tuple[_Lower, _Upper], AfterValidator(ordered)]
 PlainFile = Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[A-Za-z0-9][A-Za-z0-9._ -]*$")]
 Point = tuple[float, float]
 Name = Annotated[str, Field(min_length=1, max_length=40, pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
@@ -118,11 +113,11 @@ _COUNTS = Field(json_schema_extra={"minItems": 1, "maxItems": MOST_PEOPLE})  # `
 class Varies(Document):
     """What differs from game to game: ranges from which each game draws by its seed."""
 
-    traffic_density: Annotated[Interval, AfterValidator(_positive)] | None = None
+    traffic_density: Factors | None = None
     """Range of a factor on the background traffic: on the rates of flows, and on the number of single vehicles."""
-    friction: Annotated[Interval, AfterValidator(_positive)] | None = None
+    friction: Factors | None = None
     """Range of the coefficient of friction, instead of the scene's `friction`."""
-    speed_limit_share: Annotated[Interval, AfterValidator(_positive)] | None = None
+    speed_limit_share: Factors | None = None
     """Range of a factor on all speed limits of the net."""
 
 

@@ -51,13 +51,14 @@ class Document(BaseModel):
         return "".join(lines) + tomli_w.dumps(self.model_dump(exclude_none=True))
 
 
-def _ordered(interval: tuple[float, float]) -> tuple[float, float]:
+def ordered(interval: tuple[float, float]) -> tuple[float, float]:
+    """A range, if its lower end is first."""
     if interval[0] > interval[1]:
         raise ValueError(f"the interval [{interval[0]:g}, {interval[1]:g}] is empty: write the lower end first")
     return interval
 
 
-Interval = Annotated[tuple[float, float], AfterValidator(_ordered)]
+Interval = Annotated[tuple[float, float], AfterValidator(ordered)]
 """A range, the lower end first."""
 
 
@@ -73,7 +74,7 @@ _MOST_BYTES, _MOST_MISTAKES = 1_000_000, 100
 _NAMES_SHOWN, _COMPARED_CHARACTERS = 40, 200
 _QUOTED = re.compile(r""""[^"\n]*"|'[^'\n]*'""")
 _ENDLESS_KEY = re.compile(r"(?<![\w.-])(?:[\w-]+[ \t]*\.[ \t]*){50}")
-NUMBER, TABLE, TABLES = "<number>", "<table>", "<tables>"  # tags of a union's members; not part of any key
+NUMBER, TABLE = "<number>", "<table>"  # tags of a union's members; not part of any key
 _NESTED_TOO_DEEP = ("tables are nested too deeply", "use a few levels of tables at most")
 
 D = TypeVar("D", bound=Document)
@@ -130,7 +131,7 @@ def nearest(word: str, words: Iterable[str]) -> str:
 
 
 def _problems(path: Path, model: type[BaseModel], error: Any) -> Iterator[Problem]:
-    location = [part for part in error["loc"] if part not in ("function-after", "[key]", NUMBER, TABLE, TABLES)]
+    location = [part for part in error["loc"] if part not in ("function-after", "[key]", NUMBER, TABLE)]
     named = model.named_location(location) if issubclass(model, Document) else location
     key = ".".join(f"[{part}]" if isinstance(part, int) else str(part) for part in named).replace(".[", "[")
     cause = error.get("ctx", {}).get("error")

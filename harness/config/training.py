@@ -69,16 +69,14 @@ class Training(Document):
     def _sizes_are_consistent(self) -> Training:
         if self.buffer % self.games:
             raise ValueError(f"buffer ({self.buffer}) must be a multiple of games ({self.games})")
-        if self.initial_deviation > self.max_deviation:
-            raise ValueError(
-                f"initial_deviation ({self.initial_deviation:g}) must not exceed max_deviation ({self.max_deviation:g})"
-            )
-        if self.final_deviation > self.max_deviation:
-            raise ValueError(
-                f"final_deviation ({self.final_deviation:g}) must not exceed max_deviation ({self.max_deviation:g})"
-            )
-        if self.minibatch > self.buffer:
-            raise ValueError(f"minibatch ({self.minibatch}) must not exceed buffer ({self.buffer})")
+        for small, large in (
+            ("initial_deviation", "max_deviation"),
+            ("final_deviation", "max_deviation"),
+            ("minibatch", "buffer"),
+        ):
+            least, most = getattr(self, small), getattr(self, large)
+            if least > most:
+                raise ValueError(f"{small} ({least:g}) must not exceed {large} ({most:g})")
         return self
 
 

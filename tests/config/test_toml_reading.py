@@ -181,7 +181,7 @@ def test_number__an_integer_is_accepted_as_a_float(write: Write) -> None:
         (Persona, PERSONA + FUZZY.replace("0.2, 1.0", "-0.2, 1.0"), "human.fuzzy[0].sets[0].points", "must increase"),
         (Persona, PERSONA + FUZZY.replace("0.2, 1.0", "0.2, 1.1"), "human.fuzzy[0].sets[0].points[1][1]", "1.1 is not"),
         (Persona, PERSONA + FUZZY.replace("speed_over_limit", "speed"), "human.fuzzy[0].quantity", "mean 'speed_mps'?"),
-        (Persona, PERSONA + "[attention]\nmean_attentive_s = 5\nlapse_s = [0, 2]", "attention.lapse_s", "longer than"),
+        (Persona, PERSONA + "[attention]\nmean_attentive_s = 5\nlapse_s = [0, 2]", "attention.lapse_s[0]", "greater than 0"),
         # names of files and folders
         (Campaign, CAMPAIGN.replace('"c"', '"../c"'), "name", "'../c' is not possible (string should match pattern"),
         (Scene, SCENE.replace('"s.net.xml"', '"../s.net.xml"'), "net", "'../s.net.xml' is not possible (string should"),
