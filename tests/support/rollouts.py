@@ -19,15 +19,18 @@ from tests.support.tiny import CAREFUL, SPEEDY
 
 
 class Steady:
-    """Straight on, at the speed it has."""
+    """Keeps pedals and wheel constant; by default straight on, at the speed it has."""
 
     takes_over = True
+
+    def __init__(self, pedals: float = 0.0, wheel: float = 0.0) -> None:
+        self._action = (pedals, wheel)
 
     def reset(self, games: IntArray) -> None:
         """Nothing to forget."""
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
-        return np.zeros((len(games), 2))
+        return np.tile(self._action, (len(games), 1))
 
 
 def seated(drivers: Sequence[Driver | None], personas: Sequence[Persona]) -> tuple[Mixture | None, ...]:

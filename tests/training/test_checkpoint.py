@@ -93,6 +93,7 @@ DAMAGED: dict[str, Callable[[Tensors, Metadata], object]] = {
     "another key": lambda tensors, metadata: metadata.update(key="another"),
     "another progress": lambda tensors, metadata: metadata.update(progress="{}"),
     "no progress": lambda tensors, metadata: metadata.pop("progress"),
+    "no metadata": lambda tensors, metadata: metadata.clear(),
     "no digest": lambda tensors, metadata: metadata.pop("digest"),
 }
 
@@ -110,11 +111,6 @@ def test_read__other_content_than_was_written_is_no_checkpoint(name: str, intact
 def test_read__another_key_or_no_file_is_no_checkpoint(intact: Path, tmp_path: Path) -> None:
     assert read_checkpoint(NEW, "another", intact) is None
     check_unusable(tmp_path / "missing.safetensors")
-
-
-def test_read__a_file_without_metadata_is_no_checkpoint(intact: Path, tmp_path: Path) -> None:
-    save_file(load_file(intact), tmp_path / "plain.safetensors")
-    check_unusable(tmp_path / "plain.safetensors")
 
 
 @settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])

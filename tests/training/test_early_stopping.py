@@ -12,37 +12,33 @@ from harness.training.early_stopping import (
     LATEST,
     LEAST,
     MOST_FAILURES,
-    TOLERANCE,
     Narrowing,
     has_converged,
     still_fails,
 )
 
-
-def test_has_converged__a_flat_curve_has() -> None:
-    assert has_converged([3.0] * LEAST)
-
-
-def test_has_converged__a_rising_curve_has_not() -> None:
-    assert not has_converged(list(range(LEAST)))
-    assert not has_converged(list(range(100)))
+ZEROS, ONES = [0.0] * LATEST, [1.0] * LATEST
+NO_GAME = -math.inf
 
 
-@pytest.mark.parametrize("segments", range(LEAST))
-def test_has_converged__never_before_the_least_number_of_segments(segments: int) -> None:
-    assert not has_converged([1.0] * segments)
-
-
-def test_has_converged__a_curve_with_a_plateau_has() -> None:
-    assert has_converged([-10.0, -6.0, -2.0, *[5.0] * (2 * LATEST)])
-
-
-def test_has_converged__by_no_more_than_the_tolerance_of_the_span() -> None:
-    # span 100: the mean of the latest segments is above that of the segments before by just less, and just more, than 1
-    assert pytest.approx(0.01) == TOLERANCE
-    before = [-100.0, *[0.0] * LATEST]
-    assert has_converged([*before, *[0.99] * LATEST])
-    assert not has_converged([*before, *[1.02] * LATEST])
+@pytest.mark.parametrize(
+    ("curve", "has"),
+    [
+        ([3.0] * LEAST, True),
+        (list(range(LEAST)), False),
+        (list(range(100)), False),
+        ([1.0] * (LEAST - 1), False),
+        ([-10.0, -6.0, -2.0, *[5.0] * LEAST], True),
+        ([-100.0, *ZEROS, *[0.99] * LATEST], True),  # the latest mean is above the one before by 1 % of the span
+        ([-100.0, *ZEROS, *[1.02] * LATEST], False),
+        ([NO_GAME] * 40, False),
+        ([NO_GAME] * LATEST + ONES, False),
+        ([NO_GAME, *ONES, *ONES], True),
+        ([*[NO_GAME] * 3, *map(float, range(20))], False),
+    ],
+)
+def test_has_converged__when_the_curve_is_flat_over_the_latest_segments(curve: list[float], has: bool) -> None:
+    assert has_converged(curve) == has
 
 
 def test_has_converged__on_a_noisy_plateau_and_not_on_a_noisy_slope() -> None:
@@ -53,37 +49,23 @@ def test_has_converged__on_a_noisy_plateau_and_not_on_a_noisy_slope() -> None:
     assert 20 < stopped < 45
 
 
-def test_has_converged__segments_without_a_finished_game_do_not_count() -> None:
-    assert not has_converged([-math.inf] * 40)
-    assert not has_converged([-math.inf] * LATEST + [1.0] * LATEST)
-    assert has_converged([-math.inf, *[1.0] * LEAST])
-    assert not has_converged([*[-math.inf] * 3, *map(float, range(20))])
+AT_THE_BOUND = round(MOST_FAILURES * 10)
 
 
-# --- a flat curve of a player that can't drive ------------------------------------------------------------------------
-
-
-def test_still_fails__a_player_that_fails_in_nearly_all_games_has_not_converged() -> None:
-    """A roundabout's ego that failed in every game had a flat curve, and counted as converged."""
-    assert still_fails([100] * LEAST, [100] * LEAST)
-    assert not still_fails([100] * LEAST, [6] * LEAST)
-
-
-def test_still_fails__by_the_share_of_the_latest_segments() -> None:
-    games = [1, 1, 1, *[10] * LATEST]
-    at_the_bound = round(MOST_FAILURES * 10)
-    assert not still_fails(games, [1, 1, 1, *[at_the_bound] * LATEST])
-    assert still_fails(games, [0, 0, 0, *[at_the_bound] * (LATEST - 1), at_the_bound + 1])
-
-
-def test_still_fails__segments_count_by_their_games() -> None:
-    assert not still_fails([2, 100], [2, 10])
-
-
-def test_still_fails__without_games_alone_nothing_can_be_said() -> None:
-    assert not still_fails([], [])
-    assert not still_fails([0] * LEAST, [0] * LEAST)
-    assert not still_fails([5, *[0] * LATEST], [5, *[0] * LATEST])
+@pytest.mark.parametrize(
+    ("games", "failures", "fails"),
+    [
+        ([100] * LEAST, [100] * LEAST, True),
+        ([100] * LEAST, [6] * LEAST, False),
+        ([1, *[10] * LATEST], [1, *[AT_THE_BOUND] * LATEST], False),
+        ([1, *[10] * LATEST], [0, *[AT_THE_BOUND] * (LATEST - 1), AT_THE_BOUND + 1], True),
+        ([2, 100], [2, 10], False),  # segments count by their games
+        ([], [], False),
+        ([5, *[0] * LATEST], [5, *[0] * LATEST], False),  # without games alone nothing can be said
+    ],
+)
+def test_still_fails__by_the_share_of_the_latest_segments(games: list[int], failures: list[int], fails: bool) -> None:
+    assert still_fails(games, failures) == fails
 
 
 # --- the last part, in which actions become narrow --------------------------------------------------------------------

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -93,13 +95,7 @@ def test_train__an_interruption_does_not_change_the_policy(
     assert same(resumed, trained, tmp_path)
     assert reports[0] == (segments * 1024 + 512, 3072)  # it continued from the checkpoint
     assert reports[-1] == (3072, 3072)
-
-
-def test_train__continuing_a_finished_training_changes_nothing(
-    alone: TrainingSpec, trained: TrainingResult, tmp_path: Path
-) -> None:
-    in_one_go(alone, tmp_path)
-    assert same(in_one_go(alone, tmp_path, on_progress=stop_after(0)), trained, tmp_path)
+    assert same(in_one_go(alone, tmp_path, on_progress=stop_after(0)), trained, tmp_path)  # of a finished training
 
 
 def test_train__a_continued_converged_training_stays_converged(
@@ -136,12 +132,6 @@ def test_train__ignores_a_damaged_checkpoint_or_one_with_another_key(
     assert same(in_one_go(alone, tmp_path), trained, tmp_path)
 
 
-def test_train__another_seed_gives_another_policy(alone: TrainingSpec, trained: TrainingResult, tmp_path: Path) -> None:
-    other = in_one_go(replace(alone, parts=("training", 2, "naive")), tmp_path)
-    assert not same(other, trained, tmp_path)
-    assert other.progress.segment_payoffs != trained.progress.segment_payoffs
-
-
 def test_train__a_policy_trained_alone_ignores_other_road_users(trained: TrainingResult) -> None:
     weight = trained.policy.tensors["actor.0.weight"]
     assert np.all(weight[:, OTHERS] == 0.0)
@@ -167,13 +157,8 @@ def test_train__a_policy_trained_with_an_opponent_observes_it(
 def test_train__starts_from_the_initial_policy(
     alone: TrainingSpec, trained: TrainingResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(
-        harness.training.ppo,
-        "_segment",
-        lambda *_, **__: Progress(
-            segments=1, steps=10**9, segment_payoffs=[0.0], curve=[], alone_games=[0], alone_failures=[0]
-        ),
-    )
+    over = Progress(segments=1, steps=10**9, segment_payoffs=[0.0], curve=[], alone_games=[0], alone_failures=[0])
+    monkeypatch.setattr(harness.training.ppo, "_segment", lambda *_, **__: over)
     warm = in_one_go(replace(alone, initial=trained.policy), tmp_path)
     for name, tensor in trained.policy.tensors.items():
         if name != "log_deviation":
@@ -339,6 +324,29 @@ def test_train__a_flat_curve_of_failures_is_not_convergence(
     games, failures = trained.progress.alone_games, trained.progress.alone_failures
     assert sum(games) == sum(window.games for window in trained.progress.curve)  # it is alone in all of them
     assert sum(failures) > 0.5 * sum(games)
+
+
+WITHOUT_COMPILER = """
+import sys
+import torch
+from harness.training.ppo import _leave_out_compiler
+
+_leave_out_compiler()
+layer = torch.nn.Linear(2, 1)
+adam = torch.optim.Adam(layer.parameters(), lr=0.5)
+adam.load_state_dict(adam.state_dict())
+adam.zero_grad()
+assert "torch._dynamo" not in sys.modules
+before = layer.weight.clone()
+layer(torch.ones(2)).sum().backward()
+adam.step()
+assert torch.allclose(before - layer.weight, torch.tensor(0.5))  # Adam's first step is the learning rate
+"""
+
+
+def test_optimiser__is_made_without_the_compiler_and_takes_its_steps() -> None:
+    done = subprocess.run([sys.executable, "-c", WITHOUT_COMPILER], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.slow
