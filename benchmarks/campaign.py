@@ -25,11 +25,10 @@ from benchmarks.games import MERGE, REPOSITORY, coasting_policy, persona_file
 from benchmarks.sides import LapTimer, OnProgress, Side, running_sides
 from harness.campaign.execution import run_campaign as campaign_module
 from harness.campaign.execution.cache_keys import stage_keys
-from harness.campaign.execution.run_context import run_context_of
 from harness.campaign.execution.run_stage import carry_out
 from harness.campaign.execution.schedule import Schedule
 from harness.campaign.execution.stage_events import Event
-from harness.campaign.execution.stage_run import StageRun
+from harness.campaign.execution.stage_run import StageRun, run_context_of
 from harness.campaign.execution.worker_pool import WorkerPool
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import Stage, TrainingStage

@@ -59,7 +59,7 @@ def die_in_game_1(stage: Stage, run: StageRun) -> dict[str, Any]:
 
     def begin_or_die(place: int) -> None:
         run.on_start(place)
-        once = run.context.folder.with_name("died")
+        once = run.context.folder.path.with_name("died")
         if stage.id == "naive_vs_sumo-seed1" and place == 1:
             os.kill(os.getpid(), signal.SIGSEGV)
         if stage.id == "speedy-seed1" and place == 1 and not once.exists():

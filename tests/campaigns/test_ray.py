@@ -177,7 +177,7 @@ def test_ray__that_is_not_installed_is_named_with_the_remedy(tmp_path: Path) -> 
 
 def die_in_segments(stage: Stage, run: StageRun) -> dict[str, Any]:
     """`a` dies in its second segment twice, `b` in every run.attempt."""
-    times = run.context.folder / f"{stage.id}.times"
+    times = run.context.folder.path / f"{stage.id}.times"
     times.write_text(times.read_text() + "x" if times.exists() else "x")
     run.on_start(0)
     run.on_start(1)

@@ -16,9 +16,8 @@ import pytest
 
 import harness.environments.arena
 from harness.campaign.execution.cache_keys import stage_keys
-from harness.campaign.execution.run_context import run_context_of
 from harness.campaign.execution.run_stage import carry_out
-from harness.campaign.execution.stage_run import StageRun
+from harness.campaign.execution.stage_run import StageRun, run_context_of
 from harness.campaign.plan.plan import plan
 from harness.campaign.preflight import open_campaign
 from harness.campaign.storage.run_folder import RunFolder

@@ -6,11 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from harness.campaign.execution.cache_keys import stage_keys
-from harness.campaign.execution.run_context import RunContext
+from harness.campaign.execution.stage_run import RunContext
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.planned_drivers import Trained
 from harness.campaign.plan.stages import Stage, TrainingStage
 from harness.campaign.preflight import open_campaign
+from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign
 from harness.config.persona import Persona
 from harness.evaluation.strategies import PersonaNonEgo
@@ -43,13 +44,8 @@ def empty_context(folder: Path) -> RunContext:
     document: Any = Campaign
     persona: Any = Persona
     return RunContext(
-        folder=folder,
-        scene_folder=folder,
+        folder=RunFolder(folder),
         document=document.model_construct(),
         ego_persona=persona.model_construct(name="anyone"),
         personas={},
-        ego_driver=None,
-        other_egos={},
-        policies=None,
-        keys={},
     )

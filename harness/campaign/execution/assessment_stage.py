@@ -19,7 +19,7 @@ from typing import Any
 
 from harness.assessment.rollout import Game, SeatedArm, assess
 from harness.campaign.execution.player_factory import PlayerFactory
-from harness.campaign.execution.stage_run import Made, StageInputs, StageRun
+from harness.campaign.execution.stage_run import StageRun
 from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.storage.arm_tables import PLAYED, arm_tables
 from harness.campaign.storage.checksums import mismatches, read_checksums, write_checksums
@@ -30,6 +30,7 @@ from harness.evaluation.tables import joined, read_csv, table_of, write_csv
 from harness.evaluation.trace_file import join_traces, trace_writer
 from harness.evaluation.unplayed_games import reason_of
 from harness.files import make_folder
+from harness.road.scene.open_scene import OpenScene
 
 SEGMENT_EPISODES = 50
 HOPELESS_GAMES = 10
@@ -77,22 +78,21 @@ class Segment:
         return errors
 
 
-def carry_out_assessment(stage: AssessmentStage, inputs: StageInputs) -> Made:
-    """Play an arm. Raises as `PlayerFactory.arm` and `play_segments` do."""
-    run, folder = inputs.run, inputs.run.folder
-    players = PlayerFactory.of(inputs)
+def carry_out_assessment(stage: AssessmentStage, run: StageRun, scene: OpenScene) -> tuple[dict[str, Any], list[Path]]:
+    """Play an arm; the facts, and the files of its log. Raises as `PlayerFactory.arm` and `play_segments` do."""
+    folder, players = run.context.folder, PlayerFactory(context=run.context, scene=scene)
     stage, choice = players.chosen(stage)
     segments = segments_of(folder.segments(stage.id), run.context.document.assessment.episodes)
     labels: dict[str, str | int] = {"arm": stage.name, "persona": stage.persona, "seed": stage.seed}
     errors = play_segments(players.arm(stage), segments, labels, run)
     played, traces = folder.work(stage.id) / PLAYED, folder.traces(stage.id)
     join_segments(segments, played, traces, labels)
-    games = arm_tables(folder, stage.id, inputs.scene).episodes
-    facts: dict[str, Any] = {"episodes": segments[-1].episodes.stop, "errors": errors}
+    games = arm_tables(folder, stage.id, scene).episodes
+    facts: dict[str, Any] = {"episodes": len(games), "errors": errors}
     facts |= {"versions": [versions_of_numbers()], **choice}
     if not all(stage.sides):  # whether the training of the player that drives alone succeeded
         facts |= goals_alone(games, "ego" if stage.ego else "non_ego").record()
-    return Made(facts=facts, files=[played, traces])
+    return facts, [played, traces]
 
 
 def segments_of(folder: Path, episodes: int) -> list[Segment]:
@@ -113,15 +113,18 @@ def play_segments(arm: SeatedArm, segments: Sequence[Segment], labels: Mapping[s
     missing = [each for each, found in errors.items() if found is None or (found and run.attempt.first)]
     total = segments[-1].episodes.stop
     done = total - sum(len(segment.episodes) for segment in missing)
-    first = None if run.context.keep_going or done else list[str]()
+    first: list[str] | None = None if run.context.keep_going or done else []
 
     def on_game(game: Game) -> None:
         nonlocal done
         done += 1
         run.on_progress(done, total)
-        if first is not None and done <= HOPELESS_GAMES:
-            first.append(str(game.played["error"]))
-            _check_hope(arm, first)
+        if first is None or done > HOPELESS_GAMES:
+            return
+        first.append(str(game.played["error"]))
+        if done == HOPELESS_GAMES and all(first) and len(set(map(reason_of, first))) == 1:
+            what = f"{arm.name}: none of its first {HOPELESS_GAMES} games could be played, all for one reason"
+            raise StageFailed(f"{what} ({KEEP_GOING} plays the others too): {first[0]}")
 
     episodes = chain.from_iterable(segment.episodes for segment in missing)
     with closing(assess(arm, episodes, run.on_start, run.attempt.abandoned)) as games:  # type: ignore[type-var]
@@ -129,13 +132,6 @@ def play_segments(arm: SeatedArm, segments: Sequence[Segment], labels: Mapping[s
             segment.file("json").unlink(missing_ok=True)
             errors[segment] = segment.play(games, labels, arm, on_game)
     return sum(found or 0 for found in errors.values())
-
-
-def _check_hope(arm: SeatedArm, errors: Sequence[str]) -> None:
-    """Raise StageFailed if these are the errors of an arm's first games, and all of one reason."""
-    if len(errors) == HOPELESS_GAMES and all(errors) and len({reason_of(each) for each in errors}) == 1:
-        what = f"{arm.name}: none of its first {HOPELESS_GAMES} games could be played, all for one reason"
-        raise StageFailed(f"{what} ({KEEP_GOING} plays the others too): {errors[0]}")
 
 
 def join_segments(

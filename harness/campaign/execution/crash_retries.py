@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
 
+from harness.campaign.execution.stage_events import Event
 from harness.campaign.execution.stage_run import Attempt
 from harness.campaign.plan.stages import AssessmentStage, PreventabilityStage, Stage
 
@@ -12,14 +12,6 @@ MOST_CRASHES = 3
 """Crashes of one segment or game after which it is not tried again."""
 MOST_ABANDONED = 20
 """Games of an arm that may be abandoned in one run of the command. With more, the scene is at fault and not a game."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class CrashResponse:
-    """What a crash means for its stage."""
-
-    message: str
-    stage_fails: bool = False
 
 
 class Crashes:
@@ -49,17 +41,19 @@ class Crashes:
             self._farthest[stage] = place
             del self._counts[stage, None]
 
-    def note_crash(self, stage: Stage, cause: str) -> CrashResponse:
-        """A worker crashed in a stage, of `cause`."""
+    def note_crash(self, stage: Stage, cause: str) -> Event:
+        """A worker crashed in a stage, of `cause`. Returns what this means for the stage: crashed, to be tried again,
+        or failed."""
         place = self._place.get(stage.id)
         self._counts[stage.id, place] += 1
         if self._counts[stage.id, place] < MOST_CRASHES:
-            return CrashResponse(message=cause)
+            return Event(kind="crashed", stage=stage.id, message=cause)
         often = f"{cause}, {MOST_CRASHES} times"
         if place is None or not isinstance(stage, AssessmentStage | PreventabilityStage):
-            return CrashResponse(message=often, stage_fails=True)
+            return Event(kind="failed", stage=stage.id, message=often)
         abandoned = self._abandoned.setdefault(stage.id, {})
         abandoned[place] = often
         if len(abandoned) > MOST_ABANDONED:
-            return CrashResponse(message=f"{len(abandoned)} games crashed; the last: {often}", stage_fails=True)
-        return CrashResponse(message=f"{often} in game {place}, which is abandoned")
+            message = f"{len(abandoned)} games crashed; the last: {often}"
+            return Event(kind="failed", stage=stage.id, message=message)
+        return Event(kind="crashed", stage=stage.id, message=f"{often} in game {place}, which is abandoned")

@@ -11,19 +11,21 @@ So the folder can be moved, committed and played without the run.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+from harness.assessment.rollout import SeatedArm
 from harness.assessment.start_trials import StartTrials
-from harness.campaign.execution.run_players import RunPlayers, SeatedDriver, seated_arm
+from harness.campaign.execution.run_players import RunPlayers, SeatedDriver
 from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.persona import Persona
 from harness.config.pinned_game import FORMAT, PinnedGame, PinnedPerson, PinnedStart
+from harness.drivers.mixture import mixture_of
 from harness.drivers.policy_file import policy_files
 from harness.errors import UsageError
 from harness.evaluation.minimising import minimise
@@ -102,9 +104,10 @@ class PinnedGames:
 
     def pin(self, failure: RunFailure) -> Pinned:
         """Minimise a failure and write it. Raises UsageError if the game can't be repeated, SimulationError."""
-        stage = self._players.arm(failure.arm, failure.seed)
+        stage, scene = self._players.arm(failure.arm, failure.seed), self._players.scene
         ego, people = self._players.ego(stage), self._players.people(stage, failure.episode)
-        arm = seated_arm(self._players.scene, failure.arm, failure.seed, (ego, *people))
+        drivers = tuple(mixture_of(each.driver, each.persona) for each in (ego, *people))
+        arm = SeatedArm(name=failure.arm, scene=scene, drivers=drivers, seed=failure.seed)
         with StartTrials(arm, failure.episode) as trials:
             game = trials.play(None)
             if not game.record.get("ego_failed"):
@@ -122,10 +125,28 @@ class PinnedGames:
                 failing, passing, games = found.fails, found.passes, found.games
             last = trials.play(failing)
         starts = {"drawn_start": drawn, "start": failing, "no_failure_from": passing}
-        pinned = self._document(failure, (ego, *people), str(last.record["ego_outcome"]), starts)
-        file = self._out / f"{failure.arm}-seed{failure.seed}-{failure.episode:04d}.toml"
-        write_atomically(file, pinned.toml(_COMMENT).encode())
-        return Pinned(file=file, game=pinned, games=games)
+        pinned = PinnedGame.model_validate(
+            {
+                "format": FORMAT,
+                "scene": "scene",
+                "scene_sha256": {
+                    name: self._write(f"scene/{name}", (scene.folder / name).read_bytes())
+                    for name in scene.document.files
+                },
+                "arm": failure.arm,
+                "seed": failure.seed,
+                "episode": failure.episode,
+                "outcome": str(last.record["ego_outcome"]),
+                "found_with": ego.policy.name if ego.policy is not None else failure.arm.partition("_vs_")[0],
+                "alike": failure.alike,
+                "ego_persona": self._copied_persona(ego.persona),
+                "people": [self._person(each) for each in people],
+                **{name: _start(each) for name, each in starts.items() if each is not None},
+            }
+        )
+        name = f"{failure.arm}-seed{failure.seed}-{failure.episode:04d}.toml"
+        self._write(name, pinned.toml(_COMMENT).encode())
+        return Pinned(file=self._out / name, game=pinned, games=games)
 
     def _failed(self) -> pd.DataFrame:
         return self._episodes[(self._episodes["error"] == "") & (self._episodes["ego_failed"] == 1)]
@@ -147,53 +168,25 @@ class PinnedGames:
         drawn = draw_initial_state(distribution, *parts_of(stage.seed, episode))
         return np.concatenate((drawn.position_m, drawn.speed_mps))
 
-    def _document(
-        self, failure: RunFailure, seats: Sequence[SeatedDriver], outcome: str, starts: Mapping[str, FloatArray | None]
-    ) -> PinnedGame:
-        ego, *people = seats
-        return PinnedGame.model_validate(
-            {
-                "format": FORMAT,
-                "scene": "scene",
-                "scene_sha256": self._copied_scene(),
-                "arm": failure.arm,
-                "seed": failure.seed,
-                "episode": failure.episode,
-                "outcome": outcome,
-                "found_with": ego.policy.name if ego.policy is not None else failure.arm.partition("_vs_")[0],
-                "alike": failure.alike,
-                "ego_persona": self._copied_persona(ego.persona),
-                "people": [self._person(each) for each in people],
-                **{name: _start(each) for name, each in starts.items() if each is not None},
-            }
-        )
-
-    def _copied_scene(self) -> Mapping[str, str]:
-        scene = self._players.scene
-        hashes = {}
-        for name in scene.document.files:
-            content = (scene.folder / name).read_bytes()
-            make_folder(self._out / "scene")
-            write_atomically(self._out / "scene" / name, content)
-            hashes[name] = hashlib.sha256(content).hexdigest()
-        return hashes
+    def _write(self, place: str, content: bytes) -> str:
+        """Write a file of the folder; its SHA-256."""
+        make_folder((self._out / place).parent)
+        write_atomically(self._out / place, content)
+        return hashlib.sha256(content).hexdigest()
 
     def _copied_persona(self, persona: Persona) -> str:
-        written = f"personas/{persona.name}.toml"
-        make_folder(self._out / "personas")
-        write_atomically(self._out / written, persona.toml().encode())
-        return written
+        place = f"personas/{persona.name}.toml"
+        self._write(place, persona.toml().encode())
+        return place
 
     def _person(self, seated: SeatedDriver) -> PinnedPerson:
         persona = self._copied_persona(seated.persona)
         if seated.policy is None:
             return PinnedPerson(persona=persona)
-        folder = self._out / "policies" / seated.policy.name
-        make_folder(folder)
-        for file in policy_files(seated.policy):
-            write_atomically(folder / file.name, file.read_bytes())
-        parameters = policy_files(seated.policy)[1].read_bytes()
-        policy, digest = f"policies/{folder.name}", hashlib.sha256(parameters).hexdigest()
+        policy = f"policies/{seated.policy.name}"
+        card, parameters = policy_files(seated.policy)
+        self._write(f"{policy}/{card.name}", card.read_bytes())
+        digest = self._write(f"{policy}/{parameters.name}", parameters.read_bytes())
         return PinnedPerson(persona=persona, policy=policy, policy_sha256=digest)
 
 

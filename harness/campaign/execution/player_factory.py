@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from harness.assessment.rollout import SeatedArm, assess
-from harness.campaign.execution.run_context import RunContext
-from harness.campaign.execution.stage_run import StageInputs
+from harness.campaign.execution.stage_run import RunContext
 from harness.campaign.plan.planned_drivers import (
     BestOf,
     EquilibriumMixture,
@@ -55,22 +54,12 @@ class PlayerFactory:
     DriverError, and arms that weigh a mixture and have no equilibrium StageFailed."""
 
     context: RunContext
-    folder: RunFolder
     scene: OpenScene
-
-    @classmethod
-    def of(cls, inputs: StageInputs) -> PlayerFactory:
-        """The factory of an attempt at a stage."""
-        return cls(context=inputs.run.context, folder=inputs.run.folder, scene=inputs.scene)
 
     def arm(self, stage: AssessmentStage) -> SeatedArm:
         """The arm of an assessment. A `BestOf` in it has to be `chosen` first."""
-        drivers = (self.ego(stage.ego), *self.people(stage.non_ego))
+        drivers = (self.player(driver_in(stage.ego, 0)), *self.people(stage.non_ego))
         return SeatedArm(name=stage.name, scene=self.scene, drivers=drivers, seed=stage.seed)
-
-    def ego(self, side: Side) -> Mixture | None:
-        """The ego's drivers."""
-        return self.player(driver_in(side, 0))
 
     def people(self, side: Side) -> tuple[Mixture | None, ...]:
         """The drivers in each place of the non-egos, each made anew."""
@@ -84,7 +73,7 @@ class PlayerFactory:
             case FixedMixture(members=members, shares=shares):
                 return self._mixture(members, shares)
             case EquilibriumMixture(members=members):
-                return self._mixture(members, equilibrium_of(planned, self.folder))
+                return self._mixture(members, equilibrium_of(planned, self.context.folder))
             case BestOf():
                 raise TypeError("choose the best with `chosen` first")
             case _:
@@ -116,11 +105,10 @@ class PlayerFactory:
 
     def policy_folder(self, planned: Trained | TrainedBefore) -> Path:
         """The folder of a policy, of this run or of another."""
-        match planned:
-            case Trained(stage=stage):
-                return self.folder.policy(stage)
-            case TrainedBefore(stage=stage):
-                return self.context.policy_before(stage)
+        if isinstance(planned, Trained):
+            return self.context.folder.policy(planned.stage)
+        assert self.context.policies is not None
+        return self.context.policies / planned.stage
 
     def _mixture(self, members: tuple[PlannedMember, ...], shares: tuple[float, ...]) -> Mixture:
         return Mixture(
@@ -140,7 +128,7 @@ class PlayerFactory:
             case External(name=name):
                 return self.context.external_driver(name).make(car_of(self.scene.world, EGO), sampled)
             case Reconfigured(stage=stage):
-                found = _read_found(self.context.external_driver(), self.folder.policy(stage))
+                found = _read_found(self.context.external_driver(), self.context.folder.policy(stage))
                 return found.make(car_of(self.scene.world, EGO), sampled)
             case TrainedBefore(stage=stage) if stage in self.context.policy_drivers:
                 car = car_of(self.scene.world, EGO + 1 if persona_of(planned) else EGO)

@@ -9,15 +9,15 @@ nothing but itself: the table is the same bytes with and without interruptions.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from harness.assessment.conflict_replay import Chance, ConflictReplay, Takeover, collision_of
-from harness.assessment.rollout import SeatedArm, assess
+from harness.assessment.conflict_replay import ConflictReplay, collision_of
+from harness.assessment.rollout import assess
 from harness.campaign.execution.player_factory import PlayerFactory
-from harness.campaign.execution.stage_run import Made, StageInputs, StageRun
+from harness.campaign.execution.stage_run import StageRun
 from harness.campaign.plan.planned_drivers import SumoDriven
 from harness.campaign.plan.stages import PreventabilityStage
 from harness.campaign.storage.arm_tables import arm_tables
@@ -32,72 +32,57 @@ from harness.evaluation.tables import table_of, write_csv
 from harness.evaluation.trace_file import TraceReader
 from harness.files import make_folder
 from harness.game.roles import EGO
+from harness.road.scene.open_scene import OpenScene
 
 _COLLISIONS_AT_ONCE = 100  # what the ego sees in each of their steps is kept in memory
 
 
-@dataclass(frozen=True, kw_only=True)
-class _JudgedArm:
-    """An arm whose failures are judged."""
-
-    stage: PreventabilityStage
-    run: StageRun
-    arm: SeatedArm
-    """The arm with SUMO's driver in the ego's seat, which the reference drivers take."""
-
-
-def carry_out_preventability(stage: PreventabilityStage, inputs: StageInputs) -> Made:
-    """Judge every failure of an arm.
+def carry_out_preventability(
+    stage: PreventabilityStage, run: StageRun, scene: OpenScene
+) -> tuple[dict[str, Any], list[Path]]:
+    """Judge every failure of an arm; the facts, and the file of the table.
 
     The run is told of each episode before it is played, and of the games played and their number. Raises UsageError for
     damaged files of the arm, SimulationError if SUMO can't load the scene.
     """
-    run, of = inputs.run, stage.of
-    seatless = replace(of, ego=(SumoDriven(),))
-    work = _JudgedArm(stage=stage, run=run, arm=PlayerFactory.of(inputs).arm(seatless))
-    episodes = arm_tables(run.folder, of.id).episodes
+    folder, of = run.context.folder, stage.of
+    episodes = arm_tables(folder, of.id).episodes
     failures = episodes[(episodes["error"] == "") & (episodes["ego_failed"] == 1)]
     numbers = [int(episode) for episode in failures["episode"]]
-    conflicts, failed_s = _from_conflict(work, numbers)
-    starts = _from_start(work, numbers)
-    rows = [
-        _row(work, failure, name, starts[name][int(failure.episode)])
-        | {"failed_s": failed_s[int(failure.episode)]}
-        | conflicts.get((int(failure.episode), name), {})
-        for failure in failures.itertuples()
-        for name in REFERENCES
-    ]
-    table = run.folder.work(stage.id) / JUDGED
+    conflicts, failed_s = _from_conflict(scene, folder.traces(of.id), numbers, of.seed)
+    starts = _from_start(stage, run, scene, numbers)
+    rows = []
+    for failure in failures.itertuples():
+        episode = int(failure.episode)
+        for name in REFERENCES:
+            outcome, error = starts[name][episode]["outcome"], starts[name][episode]["error"]
+            row = {
+                "arm": failure.arm,
+                "persona": failure.persona,
+                "seed": of.seed,
+                "episode": episode,
+                "driver": name,
+                "ego_outcome": failure.ego_outcome,
+                "outcome_from_start": "" if error else outcome,
+                "prevented_from_start": None if error else int(outcome == "goal"),
+                "error": error,
+                "failed_s": failed_s[episode],
+            }
+            rows.append(row | conflicts.get((episode, name), {}))
+    table = folder.work(stage.id) / JUDGED
     write_csv(table_of("reference_drivers", rows), table)
     errors = int((episodes["error"] != "").sum()) + sum(row["error"] != "" for row in rows)
-    facts = {"episodes": len(numbers), "errors": errors, "versions": [versions_of_numbers()]}
-    return Made(facts=facts, files=[table])
-
-
-def _row(work: _JudgedArm, failure: Any, name: str, outcome: Mapping[str, str]) -> dict[str, Any]:
-    played = not outcome["error"]
-    return {
-        "arm": failure.arm,
-        "persona": failure.persona,
-        "seed": work.stage.seed,
-        "episode": failure.episode,
-        "driver": name,
-        "ego_outcome": failure.ego_outcome,
-        "outcome_from_start": outcome["outcome"] if played else "",
-        "prevented_from_start": int(outcome["outcome"] == "goal") if played else None,
-        "error": outcome["error"],
-    }
+    return {"episodes": len(numbers), "errors": errors, "versions": [versions_of_numbers()]}, [table]
 
 
 def _from_conflict(
-    work: _JudgedArm, episodes: Sequence[int]
+    scene: OpenScene, traces: Path, episodes: Sequence[int], seed: int
 ) -> tuple[dict[tuple[int, str], dict[str, Any]], dict[int, float]]:
     """The cells of the verdict from the conflict on, by episode and driver; and when each game failed."""
-    scene, reader = work.arm.scene, TraceReader()
-    step_s, ego = scene.world.step_s, scene.world.roles[EGO]
+    reader, step_s, ego = TraceReader(), scene.world.step_s, scene.world.roles[EGO]
     collisions, failed_s = [], {}
     for episode in episodes:
-        trace = reader.read(work.run.folder.traces(work.stage.of.id), episode)
+        trace = reader.read(traces, episode)
         ended = trace.loc[(trace["player"] == ego) & (trace["outcome"] != ""), "step"]
         failed_s[episode] = float(ended.min()) * step_s
         if (collision := collision_of(trace, scene, episode)) is not None:
@@ -105,57 +90,42 @@ def _from_conflict(
     cells: dict[tuple[int, str], dict[str, Any]] = {}
     for first in range(0, len(collisions), _COLLISIONS_AT_ONCE):
         some = collisions[first : first + _COLLISIONS_AT_ONCE]
-        replay = ConflictReplay(scene, some, work.stage.seed)
+        replay = ConflictReplay(scene, some, seed)
         chances = replay.chances()
         for name, takeovers in replay.takeovers().items():
             for collision, takeover, chance in zip(some, takeovers, chances, strict=True):
-                cells[collision.episode, name] = _conflict_cells(takeover, chance, step_s)
+                steps = {
+                    "conflict_s": takeover.danger_step,
+                    "preventable_from_s": chance.first_step,
+                    "preventable_until_s": chance.last_step,
+                }
+                times = {name: None if step is None else step * step_s for name, step in steps.items()}
+                cells[collision.episode, name] = {**times, "prevented_from_conflict": int(takeover.prevented)}
     return cells, failed_s
 
 
-def _conflict_cells(takeover: Takeover, chance: Chance, step_s: float) -> dict[str, Any]:
-    steps = {
-        "conflict_s": takeover.danger_step,
-        "preventable_from_s": chance.first_step,
-        "preventable_until_s": chance.last_step,
-    }
-    times = {name: None if step is None else step * step_s for name, step in steps.items()}
-    return {**times, "prevented_from_conflict": int(takeover.prevented)}
-
-
-def _from_start(work: _JudgedArm, episodes: Sequence[int]) -> dict[str, dict[int, dict[str, str]]]:
+def _from_start(
+    stage: PreventabilityStage, run: StageRun, scene: OpenScene, episodes: Sequence[int]
+) -> dict[str, dict[int, dict[str, str]]]:
     """How each episode ends with each reference driver in the ego's seat: its outcome and its error."""
-    total, done = len(episodes) * len(REFERENCES), 0
+    folder = run.context.folder.segments(stage.id)
+    make_folder(folder)
+    seatless = PlayerFactory(context=run.context, scene=scene).arm(replace(stage.of, ego=(SumoDriven(),)))
     found: dict[str, dict[int, dict[str, str]]] = {}
-
-    def on_game() -> None:
-        nonlocal done
-        done += 1
-        work.run.on_progress(done, total)
-
     for name in REFERENCES:
-        file = work.run.folder.segments(work.stage.id) / f"{name}.json"
-        found[name] = _stored(file, work.run.attempt.first) or _play(work, name, episodes, on_game)
-        done = len(found) * len(episodes)
-        make_folder(file.parent)
-        outcomes = {str(episode): outcome for episode, outcome in found[name].items()}
-        write_checksums(file, file.parent, [], {"versions": versions_of_numbers(), "outcomes": outcomes})
+        outcomes = _stored(folder / f"{name}.json", run.attempt.first)
+        if outcomes is None:
+            outcomes = {}
+            driver = reference_driver(name, car_of(scene.world, EGO), lane_width_of(scene.world))
+            drivers = (mixture_of(driver, run.context.ego_persona), *seatless.drivers[1:])
+            for game in assess(replace(seatless, drivers=drivers), episodes, run.on_start, run.attempt.abandoned):
+                record = game.record
+                outcomes[record["episode"]] = {"outcome": outcome_of(record), "error": str(record["error"])}
+                run.on_progress(len(found) * len(episodes) + len(outcomes), len(episodes) * len(REFERENCES))
+            facts = {"versions": versions_of_numbers(), "outcomes": outcomes}
+            write_checksums(folder / f"{name}.json", folder, [], facts)
+        found[name] = outcomes
     return found
-
-
-def _play(
-    work: _JudgedArm, name: str, episodes: Sequence[int], on_game: Callable[[], None]
-) -> dict[int, dict[str, str]]:
-    scene = work.arm.scene
-    driver = reference_driver(name, car_of(scene.world, EGO), lane_width_of(scene.world))
-    persona = work.run.context.ego_persona
-    arm = replace(work.arm, drivers=(mixture_of(driver, persona), *work.arm.drivers[1:]))
-    outcomes = {}
-    for game in assess(arm, episodes, work.run.on_start, work.run.attempt.abandoned):
-        record = game.record
-        outcomes[int(record["episode"])] = {"outcome": outcome_of(record), "error": str(record["error"])}
-        on_game()
-    return outcomes
 
 
 def outcome_of(record: Mapping[str, Any]) -> str:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from harness.campaign.execution.run_context import RunContext
+from harness.campaign.execution.stage_run import RunContext
 from harness.campaign.storage.locks import is_held
 from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.versions import versions_of_numbers
@@ -38,25 +38,6 @@ class Node:
     """Number of stages."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class NodeAnswer:
-    """What a node answers to a check."""
-
-    versions: Mapping[str, str]
-    token: str
-    """What it read in the run folder."""
-    lock_held: bool
-    """Whether it finds the lock of the run folder held."""
-    missing: tuple[str, ...]
-    """Files that it needs and does not see."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Check:
-    node: Node
-    until_s: float
-
-
 @dataclass(kw_only=True)
 class Nodes:
     """The nodes of the cluster that `ray` is connected to, for a run."""
@@ -66,14 +47,15 @@ class Nodes:
     token: str
     """Is in `token_file(folder)` as long as the run lasts."""
     usable: dict[str, Node] = field(default_factory=dict)
-    _checks: dict[Any, _Check] = field(default_factory=dict)
+    _checks: dict[Any, tuple[Node, float]] = field(default_factory=dict)
+    """The checks that have not ended: of which node, and the time at which it is late."""
     _refused: set[str] = field(default_factory=set)
 
     def look(self) -> None:
         """Start a check of every node that is new, and forget those that are dead."""
         alive = {each["NodeID"]: each for each in self.ray.nodes() if each["Alive"]}
         self.usable = {name: node for name, node in self.usable.items() if name in alive}
-        checked = {check.node.id for check in self._checks.values()}
+        checked = {node.id for node, _ in self._checks.values()}
         for name in alive.keys() - self.usable.keys() - checked - self._refused:
             each = alive[name]
             if cpus := int(each["Resources"].get("CPU", 0)):
@@ -89,7 +71,8 @@ class Nodes:
         if not self._checks:
             return []
         ended, _ = self.ray.wait(list(self._checks), num_returns=1, timeout=timeout_s)
-        late = [ref for ref, check in self._checks.items() if time.monotonic() > check.until_s and ref not in ended]
+        now_s = time.monotonic()
+        late = [ref for ref, (_, until_s) in self._checks.items() if now_s > until_s and ref not in ended]
         return [problem for ref in (*ended, *late) if (problem := self._end_check(ref, late=ref in late)) is not None]
 
     @property
@@ -98,28 +81,23 @@ class Nodes:
         return bool(self._checks)
 
     def _start_check(self, node: Node) -> None:
-        task = self.ray.remote(num_cpus=0, max_retries=0, scheduling_strategy=pinned(node.id))(answer_of_node)
-        ref = task.remote(self.context.folder, _needed_files(self.context))
-        self._checks[ref] = _Check(node=node, until_s=time.monotonic() + _ANSWER_S)
+        task = self.ray.remote(num_cpus=0, max_retries=0, scheduling_strategy=pinned(node.id))(wrong_here)
+        ref = task.remote(self.context.folder, self.token, _needed_files(self.context), versions_of_numbers())
+        self._checks[ref] = node, time.monotonic() + _ANSWER_S
 
     def _end_check(self, ref: Any, late: bool) -> Problem | None:
-        check = self._checks.pop(ref)
-        problem: Problem | None
+        node, _ = self._checks.pop(ref)
         try:
-            if late:
-                problem = _problem(check.node, f"does not answer within {_ANSWER_S:g} s", _RESTART)
-            else:
-                problem = problem_of(check.node, self.ray.get(ref), self.context, self.token)
+            wrong = (f"does not answer within {_ANSWER_S:g} s", _RESTART) if late else self.ray.get(ref)
         except self.ray.exceptions.RayTaskError as error:
-            last_line = str(error).strip().splitlines()[-1]
-            problem = _problem(check.node, f"can't run the harness: {last_line}", _INSTALL)
+            wrong = f"can't run the harness: {str(error).strip().splitlines()[-1]}", _INSTALL
         except self.ray.exceptions.RayError:  # the node is dead
             return None
-        if problem is None:
-            self.usable[check.node.id] = check.node
+        if wrong is None:
+            self.usable[node.id] = node
             return None
-        self._refused.add(check.node.id)
-        return problem
+        self._refused.add(node.id)
+        return Problem(OPTION, f"node {node.name}", *wrong)
 
 
 def pinned(node: str) -> Any:
@@ -129,23 +107,9 @@ def pinned(node: str) -> Any:
     return NodeAffinitySchedulingStrategy(node, soft=False)
 
 
-def token_file(run: Path) -> Path:
+def token_file(run: RunFolder) -> Path:
     """The file by which a node recognises the run folder."""
-    return RunFolder(run).scratch / "token"
-
-
-def answer_of_node(run: Path, files: Iterable[Path]) -> NodeAnswer:
-    """A node's answer to a check. It runs there."""
-    try:
-        token = token_file(run).read_text(encoding="utf-8")
-    except OSError:
-        token = ""
-    return NodeAnswer(
-        versions=versions_of_numbers(),
-        token=token,
-        lock_held=bool(token) and is_held(RunFolder(run).lock),
-        missing=tuple(str(file) for file in files if not file.exists()),
-    )
+    return run.scratch / "token"
 
 
 def _needed_files(context: RunContext) -> list[Path]:
@@ -155,20 +119,28 @@ def _needed_files(context: RunContext) -> list[Path]:
     return [*policies, *(Path(file) for driver in drivers for file in driver.files)]
 
 
-def problem_of(node: Node, answer: NodeAnswer, context: RunContext, token: str) -> Problem | None:
-    """What is wrong with a node; None if it can be used."""
-    pairs = [(name, answer.versions.get(name), ours) for name, ours in versions_of_numbers().items()]
-    other = [f"{name} {theirs}, here {ours}" for name, theirs, ours in pairs if theirs != ours]
+def wrong_here(
+    run: RunFolder, token: str, files: Iterable[Path], versions: Mapping[str, str]
+) -> tuple[str, str] | None:
+    """What is wrong with the node on which this runs, and the remedy; None if it can be used.
+
+    `token`, `files` and `versions` are what the command has written into the run folder, what it needs, and has itself.
+    """
+    other = [
+        f"{name} {theirs}, here {versions.get(name)}"
+        for name, theirs in versions_of_numbers().items()
+        if theirs != versions.get(name)
+    ]
     if other:
-        return _problem(node, f"has other versions than this machine: {'; '.join(other)}", _INSTALL)
-    if answer.token != token:
-        return _problem(node, f"does not see the run folder {context.folder}", _SHARE)
-    if answer.missing:
-        return _problem(node, f"does not see {', '.join(answer.missing)}", _SHARE)
-    if not answer.lock_held:
-        return _problem(node, f"the lock of the run folder {context.folder} does not hold there", _LOCKS)
+        return f"has other versions than this machine: {'; '.join(other)}", _INSTALL
+    try:
+        found = token_file(run).read_text(encoding="utf-8")
+    except OSError:
+        found = ""
+    if found != token:
+        return f"does not see the run folder {run.path}", _SHARE
+    if missing := [str(file) for file in files if not file.exists()]:
+        return f"does not see {', '.join(missing)}", _SHARE
+    if not is_held(run.lock):
+        return f"the lock of the run folder {run.path} does not hold there", _LOCKS
     return None
-
-
-def _problem(node: Node, message: str, remedy: str) -> Problem:
-    return Problem(OPTION, f"node {node.name}", message, remedy)

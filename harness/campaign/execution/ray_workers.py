@@ -10,17 +10,13 @@ import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from types import TracebackType
 from typing import Any
 
 from harness.campaign.execution.ray_nodes import OPTION, Node, Nodes, pinned, token_file
-from harness.campaign.execution.run_context import RunContext
 from harness.campaign.execution.run_stage import carry_out
-from harness.campaign.execution.stage_events import Event, StageJob
-from harness.campaign.execution.stage_run import Attempt, Work
-from harness.campaign.execution.worker_pool import put_scratch_into
+from harness.campaign.execution.stage_events import Event, carry_out_in_worker
+from harness.campaign.execution.stage_run import Attempt, RunContext, Work
 from harness.campaign.plan.stages import Stage
-from harness.campaign.storage.locks import held_by_worker
 from harness.campaign.storage.run_folder import RunFolder
 from harness.errors import UsageError
 from harness.files import make_folder, write_atomically
@@ -28,7 +24,6 @@ from harness.files import make_folder, write_atomically
 _POLL_S = 0.25
 _LOOK_EVERY_S = 5.0  # for nodes that joined
 _END_S = 10.0
-_LOST_S = 120.0  # the time that a process on a lost node has to end: Ray ends it, or the file system gives up its lock
 
 
 class Inbox:
@@ -71,12 +66,7 @@ class RayWorkers:
         work: Work = carry_out,
     ) -> None:
         policies = context.policies.absolute() if context.policies is not None else None
-        self._context = replace(
-            context,
-            folder=context.folder.absolute(),
-            scene_folder=context.scene_folder.absolute(),
-            policies=policies,
-        )
+        self._context = replace(context, folder=RunFolder(context.folder.path.absolute()), policies=policies)
         self._ray, self._jobs, self._warn, self._work = ray, min(jobs or stages_left, stages_left), warn, work
         self._nodes = Nodes(ray=ray, context=self._context, token=f"{os.getpid()} {time.time_ns()}")
         self._remote = ray.remote(num_cpus=1, max_retries=0)(_carry_out)
@@ -99,8 +89,9 @@ class RayWorkers:
         node = max(self._nodes.usable.values(), key=lambda each: each.cpus - each.running)
         task = _Task(number=self._started, stage=stage, node=node)
         remote = self._remote.options(scheduling_strategy=pinned(node.id))
-        job = StageJob(stage=stage, attempt=attempt, context=self._context, work=self._work)
-        ref = remote.remote(task.number, job, self._inbox)
+        ref = remote.remote(
+            stage, attempt, context=self._context, work=self._work, number=task.number, inbox=self._inbox
+        )
         self._tasks[ref] = task
         self._started += 1
         node.running += 1
@@ -131,9 +122,7 @@ class RayWorkers:
         self._inbox = self._ray.remote(num_cpus=0, scheduling_strategy=here)(Inbox).remote()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *exception: object) -> None:
         for ref in self._tasks:
             self._ray.cancel(ref, force=True)
         if self._tasks:
@@ -166,7 +155,7 @@ def _cause(errors: Any, error: Exception, node: Node) -> str:
     return f"node {node.name} is lost ({type(error).__name__})"
 
 
-def _carry_out(number: int, job: StageJob, inbox: Any) -> Event:
+def _carry_out(stage: Stage, attempt: Attempt, *, context: RunContext, work: Work, number: int, inbox: Any) -> Event:
     """Carry a stage out in a process of Ray."""
     import ray
 
@@ -175,6 +164,4 @@ def _carry_out(number: int, job: StageJob, inbox: Any) -> Event:
         if event.kind == "segment":
             ray.get(message)  # if the process dies now, the place is known
 
-    folder = RunFolder(job.context.folder)
-    put_scratch_into(folder.path)
-    return job.carry_out(send, held_by_worker(folder.workers, job.stage.id, _LOST_S))
+    return carry_out_in_worker(stage, attempt, context=context, work=work, send=send)

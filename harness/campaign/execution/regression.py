@@ -5,21 +5,23 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from harness.assessment.rollout import SeatedArm
 from harness.assessment.start_trials import StartTrials
-from harness.campaign.execution.run_players import SeatedDriver, seated_arm
 from harness.config.campaign import SUMO, resolve
 from harness.config.persona import Persona
 from harness.config.pinned_game import PinnedGame, PinnedPerson
 from harness.config.toml_reading import read_document
 from harness.drivers.car import car_of
-from harness.drivers.external import ExternalDriver, find_driver
+from harness.drivers.external import find_driver
+from harness.drivers.mixture import Mixture, mixture_of
 from harness.drivers.policy import LearnedDriver
 from harness.drivers.policy_file import policy_files, read_policy
+from harness.drivers.protocol import Driver
 from harness.drivers.sumo import SumoDriver
 from harness.errors import Problem, UsageError, collect
 from harness.files import content_of
@@ -46,17 +48,6 @@ class PlayedAgain:
         return self.outcome == "goal" and not self.error
 
 
-@dataclass(frozen=True, kw_only=True)
-class OpenedGame:
-    """A pinned game with everything it names."""
-
-    name: str
-    game: PinnedGame
-    scene: OpenScene
-    ego_persona: Persona
-    people: tuple[SeatedDriver, ...]
-
-
 class Regression:
     """The pinned games of a folder. Raises UsageError with every problem found in them, and if there are none."""
 
@@ -71,32 +62,28 @@ class Regression:
         opened = [collect(problems, lambda file=file: self._open(file)) for file in files]  # type: ignore[misc]
         if problems:
             raise UsageError(problems)
-        self.games = [each for each in opened if each is not None]
+        self._games = [(file.stem, *game) for file, game in zip(files, opened, strict=True) if game is not None]
 
     def play(self) -> Iterator[PlayedAgain]:
         """Play the games one after the other. Raises SimulationError if SUMO can't load a scene."""
-        for each in self.games:
-            started = time.monotonic()
-            persona = each.ego_persona
-            ego = SeatedDriver(driver=self._driver(self._ego, each.scene, persona), persona=persona)
-            game = each.game
-            with StartTrials(seated_arm(each.scene, game.arm, game.seed, (ego, *each.people)), game.episode) as trials:
+        for name, game, persona, arm in self._games:
+            started_s = time.monotonic()
+            ego: Driver = SumoDriver()
+            if self._ego is not None:
+                ego = self._ego.make(car_of(arm.scene.world, EGO), persona.decisions == "sampled")
+            drivers = (mixture_of(ego, persona), *arm.drivers[1:])
+            with StartTrials(replace(arm, drivers=drivers), game.episode) as trials:
                 record = trials.play(np.array([*game.start.position_m, *game.start.speed_mps])).record
             yield PlayedAgain(
-                name=each.name,
+                name=name,
                 game=game,
                 outcome=str(record["ego_outcome"]),
                 error=str(record["error"]),
-                seconds=time.monotonic() - started,
+                seconds=time.monotonic() - started_s,
             )
 
-    @staticmethod
-    def _driver(ego: ExternalDriver | None, scene: OpenScene, persona: Persona) -> SumoDriver | LearnedDriver:
-        if ego is None:
-            return SumoDriver()
-        return ego.make(car_of(scene.world, EGO), persona.decisions == "sampled")  # type: ignore[return-value]
-
-    def _open(self, file: Path) -> OpenedGame:
+    def _open(self, file: Path) -> tuple[PinnedGame, Persona, SeatedArm]:
+        """A pinned game, the ego's persona, and the arm without an ego."""
         game = read_document(file, PinnedGame)
         scene_folder = resolve(file, game.scene)
         if scene_folder not in self._scenes:
@@ -107,9 +94,9 @@ class Regression:
         if len(game.people) != len(scene.world.roles) - 1:
             message = f"has {len(game.people)} people, but the scene has {len(scene.world.roles) - 1}"
             raise UsageError.of(file, "people", message, "pin the game again")
-        ego_persona = read_document(resolve(file, game.ego_persona), Persona)
-        people = tuple(_person(file, each) for each in game.people)
-        return OpenedGame(name=file.stem, game=game, scene=scene, ego_persona=ego_persona, people=people)
+        persona = read_document(resolve(file, game.ego_persona), Persona)
+        drivers = (None, *(_person(file, each) for each in game.people))
+        return game, persona, SeatedArm(name=game.arm, scene=scene, drivers=drivers, seed=game.seed)
 
 
 def _check_scene(file: Path, hashes: Mapping[str, str], scene: OpenScene) -> None:
@@ -120,16 +107,16 @@ def _check_scene(file: Path, hashes: Mapping[str, str], scene: OpenScene) -> Non
         raise UsageError.of(file, "scene", message, "pin the game again, or restore the scene")
 
 
-def _person(file: Path, person: PinnedPerson) -> SeatedDriver:
+def _person(file: Path, person: PinnedPerson) -> Mixture:
     persona = read_document(resolve(file, person.persona), Persona)
     if person.policy is None:
-        return SeatedDriver(driver=SumoDriver(), persona=persona)
+        return mixture_of(SumoDriver(), persona)
     folder = resolve(file, person.policy)
     policy = read_policy(folder)
     if _sha256(policy_files(folder)[1]) != person.policy_sha256:
         message = f"{person.policy!r} is not the policy of this game"
         raise UsageError.of(file, "people.policy_sha256", message, "pin the game again, or restore the policy")
-    return SeatedDriver(driver=LearnedDriver(policy, persona.decisions == "sampled"), persona=persona, policy=folder)
+    return mixture_of(LearnedDriver(policy, persona.decisions == "sampled"), persona)
 
 
 def _sha256(file: Path) -> str:

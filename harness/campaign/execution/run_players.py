@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from harness.assessment.rollout import SeatedArm
 from harness.campaign.execution.player_factory import PlayerFactory
-from harness.campaign.execution.run_context import RunContext
+from harness.campaign.execution.stage_run import RunContext
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.planned_drivers import (
     BestOf,
@@ -31,7 +30,6 @@ from harness.config.persona import Persona
 from harness.config.toml_reading import nearest
 from harness.drivers.car import car_of
 from harness.drivers.external import find_driver
-from harness.drivers.mixture import mixture_of
 from harness.drivers.protocol import Driver
 from harness.errors import UsageError
 from harness.files import content_of
@@ -40,7 +38,6 @@ from harness.game.roles import EGO
 from harness.road.scene.open_scene import OpenScene, open_scene
 from harness.shipped_documents import shipped
 
-_FILES = ("policy.json", "policy.safetensors")
 _MOST_BYTES = 1_000_000_000
 
 
@@ -69,21 +66,19 @@ class RunPlayers:
         document = Campaign.model_validate(manifest["campaign"], strict=False)
         self._stages = plan(document, manifest["personas"], is_tuned(manifest))
         self._context = RunContext(
-            folder=folder.path,
-            scene_folder=folder.scene,
+            folder=folder,
             document=document,
             ego_persona=Persona.from_record(manifest["ego_persona"]),
             personas={name: Persona.from_record(each) for name, each in manifest["persona_documents"].items()},
             ego_driver=driver,
-            other_egos={},
             policies=policies or policies_of_run(folder.path, document.policies, manifest["hashes"]),
-            keys={},
         )
 
     def arms(self) -> list[AssessmentStage]:
-        """The arms in which an ego meets people, with a driver each that this run can make again."""
-        arms = [each for each in self._stages if isinstance(each, AssessmentStage)]
-        return [each for each in arms if each.ego and each.non_ego and not _chosen(each)]
+        """The arms in which an ego meets people, with a driver each that this run can make again: none that other arms
+        chose or weighed."""
+        arms = [each for each in self._stages if isinstance(each, AssessmentStage) and each.ego and each.non_ego]
+        return [arm for arm in arms if not any(isinstance(each, BestOf | EquilibriumMixture) for each in arm.drivers)]
 
     def arm(self, name: str, seed: int) -> AssessmentStage:
         """An arm by name. Raises UsageError if there is none, or if its drivers were chosen by other arms."""
@@ -112,7 +107,7 @@ class RunPlayers:
         return tuple(self._seated(each, self._context.persona(persona_of(each))) for each in members)
 
     def _seated(self, planned: PlannedMember, persona: Persona) -> SeatedDriver:
-        players = PlayerFactory(context=self._context, folder=self._folder, scene=self.scene)
+        players = PlayerFactory(context=self._context, scene=self.scene)
         policy = None
         if isinstance(planned, TrainedBefore) and self._context.policies is None:
             message = f"{planned.stage!r} was read from {self._context.document.policies!r}"
@@ -120,17 +115,6 @@ class RunPlayers:
         if isinstance(planned, Trained | TrainedBefore):
             policy = players.policy_folder(planned)
         return SeatedDriver(driver=players.driver(planned), persona=persona, policy=policy)
-
-
-def seated_arm(scene: OpenScene, name: str, seed: int, seats: Sequence[SeatedDriver]) -> SeatedArm:
-    """The arm of drivers in their seats, the ego's first."""
-    drivers = tuple(mixture_of(each.driver, each.persona) for each in seats)
-    return SeatedArm(name=name, scene=scene, drivers=drivers, seed=seed)
-
-
-def _chosen(stage: AssessmentStage) -> bool:
-    """Whether a driver of an arm was chosen or weighed by other arms, so that its policy alone does not tell it."""
-    return any(isinstance(each, BestOf | EquilibriumMixture) for each in stage.drivers)
 
 
 def _member(stage: AssessmentStage, player: int, episode: int) -> PlannedMember:
@@ -150,25 +134,22 @@ def policies_of_run(run: Path, written: str | None, hashes: Mapping[str, str]) -
     Shipped policies are searched, then the path from a folder beside the run folder, such as `campaigns/` beside
     `reports/`, and from the current folder.
     """
-    read = {_place(name): digest for name, digest in hashes.items() if PurePosixPath(name).name in _FILES}
+    read = {
+        "/".join(PurePosixPath(name).parts[-2:]): digest
+        for name, digest in hashes.items()
+        if PurePosixPath(name).name in ("policy.json", "policy.safetensors")
+    }
     if written is None or not read:
         return None
-    return next((folder for folder in _candidates(run, written) if _holds(folder, read)), None)
-
-
-def _place(name: str) -> str:
-    """The path of a policy's file within the folder of policies."""
-    return "/".join(PurePosixPath(name).parts[-2:])
-
-
-def _candidates(run: Path, written: str) -> Iterator[Path]:
     ours = shipped("policies")
-    yield from sorted(each for each in ours.iterdir() if each.is_dir()) if ours.is_dir() else ()
+    folders = sorted(each for each in ours.iterdir() if each.is_dir()) if ours.is_dir() else []
     if not PurePosixPath(written).is_absolute():
-        yield from (start / written for start in (run.absolute().parent, run.absolute().parent.parent, Path.cwd()))
+        folders += [start / written for start in (run.absolute().parent, run.absolute().parent.parent, Path.cwd())]
+    return next((folder for folder in folders if _holds(folder, read)), None)
 
 
 def _holds(folder: Path, read: Mapping[str, str]) -> bool:
+    """Whether a folder has these files, by their path in it, with these checksums."""
     try:
         return all(
             hashlib.sha256(content_of(folder / place, _MOST_BYTES)).hexdigest() == digest

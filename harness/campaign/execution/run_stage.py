@@ -9,10 +9,12 @@ better shows nothing.
 from __future__ import annotations
 
 import logging
+import shutil
 import time
+from pathlib import Path
 from typing import Any
 
-from harness.campaign.execution.stage_run import Made, StageInputs, StageRun
+from harness.campaign.execution.stage_run import StageRun
 from harness.campaign.plan.stages import (
     AssessmentStage,
     EquilibriumGate,
@@ -22,7 +24,7 @@ from harness.campaign.plan.stages import (
     TrainingStage,
 )
 from harness.campaign.storage.run_folder import RunFolder
-from harness.road.scene.open_scene import open_scene
+from harness.road.scene.open_scene import OpenScene, open_scene
 
 
 def carry_out(stage: Stage, run: StageRun) -> dict[str, Any]:
@@ -30,44 +32,48 @@ def carry_out(stage: Stage, run: StageRun) -> dict[str, Any]:
 
     What the stage wrote from other inputs is removed first.
     """
-    folder, key, started = run.folder, run.context.keys[stage.id], time.monotonic()
+    context, key, started_s = run.context, run.context.keys[stage.id], time.monotonic()
+    folder = context.folder
     folder.begin(stage.id, key)
-    gate = equilibrium_before(stage, folder, run.context.document.assessment.significance)
+    gate = equilibrium_before(stage, folder, context.document.assessment.significance)
     if gate is not None:
         message = f"not needed: {gate.pair} is an approximate equilibrium"
         settled: dict[str, Any] = {"settled": gate.pair, "message": message}
         folder.finish(stage.id, key, settled)
         return settled
-    scene = open_scene(run.context.scene_folder, run.context.vehicle_type(stage))
-    made = _make(stage, StageInputs(run=run, scene=scene))
-    seconds, today = round(time.monotonic() - started, 1), time.strftime("%Y-%m-%d", time.gmtime())
-    facts = {**made.facts, "seconds": seconds, "finished_on": today}
-    folder.finish(stage.id, key, facts, made.files)
+    scene = open_scene(folder.scene, context.vehicle_type(stage))
+    facts, files = _make(stage, run, scene)
+    facts["seconds"] = round(time.monotonic() - started_s, 1)
+    facts["finished_on"] = time.strftime("%Y-%m-%d", time.gmtime())
+    folder.finish(stage.id, key, facts, files)
     if not facts.get("errors"):  # the segments of failed games are kept: the next run of the command plays those again
-        folder.drop_segments(stage.id)
+        shutil.rmtree(folder.segments(stage.id), ignore_errors=True)
     return facts
 
 
-def _make(stage: Stage, inputs: StageInputs) -> Made:
-    """Make what a stage makes. Each kind imports what it needs: PyTorch and Optuna are slow to import."""
+def _make(stage: Stage, run: StageRun, scene: OpenScene) -> tuple[dict[str, Any], list[Path]]:
+    """Make what a stage makes: facts for the manifest, and the files that its numbers are read from.
+
+    Each kind imports what it needs: PyTorch and Optuna are slow to import.
+    """
     match stage:
         case TrainingStage():
             logging.getLogger("harness.preparation").info("loading PyTorch")
             from harness.campaign.execution.training_stage import carry_out_training
 
-            return carry_out_training(stage, inputs)
+            return carry_out_training(stage, run, scene)
         case AssessmentStage():
             from harness.campaign.execution.assessment_stage import carry_out_assessment
 
-            return carry_out_assessment(stage, inputs)
+            return carry_out_assessment(stage, run, scene)
         case SearchStage():
             from harness.campaign.execution.search_stage import carry_out_search
 
-            return carry_out_search(stage, inputs)
+            return carry_out_search(stage, run, scene)
         case PreventabilityStage():
             from harness.campaign.execution.preventability_stage import carry_out_preventability
 
-            return carry_out_preventability(stage, inputs)
+            return carry_out_preventability(stage, run, scene)
 
 
 def equilibrium_before(stage: Stage, folder: RunFolder, significance: float) -> EquilibriumGate | None:

@@ -11,14 +11,12 @@ the same game an arm continues without that game, which is an error.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from types import TracebackType
 from typing import Protocol, TypeAlias
 
 from harness.campaign.execution.crash_retries import Crashes
-from harness.campaign.execution.run_context import RunContext
 from harness.campaign.execution.schedule import Schedule
 from harness.campaign.execution.stage_events import Emit, Event
-from harness.campaign.execution.stage_run import Attempt
+from harness.campaign.execution.stage_run import Attempt, RunContext
 from harness.campaign.plan.stages import Stage
 
 
@@ -42,9 +40,7 @@ class Workers(Protocol):
         ...
 
     def __enter__(self) -> Workers: ...
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None: ...
+    def __exit__(self, *exception: object) -> None: ...
 
 
 StartWorkers: TypeAlias = Callable[[RunContext, int], Workers]
@@ -57,55 +53,35 @@ def run_stages(stages: Sequence[Stage], finished: Iterable[str], workers: Worker
     Everything that happens is emitted; nothing is raised for a stage that fails. Raises PlanError where the stages
     can't all be carried out in some order.
     """
-    run = _Run(stages, finished, emit)
+    schedule, crashes, running = Schedule(stages, finished), Crashes(), dict[str, Stage]()
+
+    def handle(event: Event) -> None:
+        """Let schedule and crash counts follow an event of a running stage, and emit it."""
+        if event.kind == "segment":
+            crashes.note_start(event.stage, event.done)
+            return
+        if event.kind == "crashed":
+            event = crashes.note_crash(running[event.stage], event.message)
+        emit(event)
+        if event.kind == "progress":
+            return
+        stage = running.pop(event.stage)
+        match event.kind:
+            case "crashed":
+                schedule.put_back(stage)
+            case "failed":
+                for skipped, failed in schedule.fail(stage.id).items():
+                    emit(Event(kind="skipped", stage=skipped, message=f"needs {', '.join(failed)}, which failed"))
+            case _:
+                schedule.done(stage.id)
+
     with workers:
         while True:
-            run.dispatch(workers)
-            if not run.running:
+            while len(running) < workers.capacity and (stage := schedule.take()) is not None:
+                running[stage.id] = stage
+                workers.submit(stage, crashes.next_attempt(stage))
+                emit(Event(kind="started", stage=stage.id))
+            if not running:
                 return
             for event in workers.next_events():
-                run.handle(event)
-
-
-class _Run:
-    """The stages that are running, and what their events mean for the others."""
-
-    def __init__(self, stages: Sequence[Stage], finished: Iterable[str], emit: Emit) -> None:
-        self.running: dict[str, Stage] = {}
-        self._schedule, self._crashes, self._emit = Schedule(stages, finished), Crashes(), emit
-
-    def dispatch(self, workers: Workers) -> None:
-        """Submit what is ready, as far as the workers have room."""
-        while len(self.running) < workers.capacity and (stage := self._schedule.take()) is not None:
-            self.running[stage.id] = stage
-            workers.submit(stage, self._crashes.next_attempt(stage))
-            self._emit(Event(kind="started", stage=stage.id))
-
-    def handle(self, event: Event) -> None:
-        """Let schedule and crash counts follow an event of a running stage, and emit it."""
-        match event.kind:
-            case "segment":
-                self._crashes.note_start(event.stage, event.done)
-            case "progress":
-                self._emit(event)
-            case "crashed":
-                self._crashed(self.running.pop(event.stage), event)
-            case "failed":
-                self._fail(self.running.pop(event.stage), event)
-            case _:
-                self._schedule.done(self.running.pop(event.stage).id)
-                self._emit(event)
-
-    def _crashed(self, stage: Stage, event: Event) -> None:
-        response = self._crashes.note_crash(stage, event.message)
-        if response.stage_fails:
-            self._fail(stage, Event(kind="failed", stage=stage.id, message=response.message))
-            return
-        self._schedule.put_back(stage)
-        self._emit(Event(kind="crashed", stage=stage.id, message=response.message))
-
-    def _fail(self, stage: Stage, event: Event) -> None:
-        self._emit(event)
-        for each in self._schedule.fail(stage.id):
-            message = f"needs {', '.join(each.failed)}, which failed"
-            self._emit(Event(kind="skipped", stage=each.stage, message=message))
+                handle(event)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from typing import Generic, Protocol, TypeVar
@@ -25,14 +24,6 @@ class Schedulable(Protocol):
 StageT = TypeVar("StageT", bound=Schedulable)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Skipped:
-    """A stage that can't be carried out, because stages that it needs failed."""
-
-    stage: str
-    failed: tuple[str, ...]
-
-
 class Schedule(Generic[StageT]):
     """The stages that are left, each handed out when everything that it needs is done.
 
@@ -44,7 +35,9 @@ class Schedule(Generic[StageT]):
         """Raises PlanError where a stage needs an id that is neither planned nor finished, or needs are circular."""
         finished = set(finished)
         self._stages = {stage.id: stage for stage in stages if stage.id not in finished}
-        _check_needs(stages, finished)
+        known = {stage.id for stage in stages} | finished
+        if missing := [f"{stage.id} needs {name}" for stage in stages for name in stage.needs if name not in known]:
+            raise PlanError(f"{'; '.join(missing)}: neither planned nor finished")
         needs = {name: [each for each in stage.needs if each not in finished] for name, stage in self._stages.items()}
         self._needed_by: dict[str, list[str]] = {name: [] for name in needs}
         for name, each in needs.items():
@@ -73,26 +66,20 @@ class Schedule(Generic[StageT]):
         self._sorter.done(stage)
         self._collect_ready()
 
-    def fail(self, stage: str) -> list[Skipped]:
-        """A stage that was taken has failed. Returns the stages that are skipped because of it."""
+    def fail(self, stage: str) -> dict[str, list[str]]:
+        """A stage that was taken has failed. Returns the stages that are skipped because of it, each with the failed or
+        skipped stages that it needs."""
         self._failed.add(stage)
-        skipped: list[Skipped] = []
+        skipped: dict[str, list[str]] = {}
         for name in self._needed_by[stage]:
             if name not in self._failed:
-                failed = tuple(each for each in self._stages[name].needs if each in self._failed)
-                skipped += [Skipped(stage=name, failed=failed), *self.fail(name)]
+                skipped[name] = [each for each in self._stages[name].needs if each in self._failed]
+                skipped |= self.fail(name)
         return skipped
 
     def _collect_ready(self) -> None:
         self._ready += self._sorter.get_ready()
         self._ready.sort(key=self._priorities.__getitem__)
-
-
-def _check_needs(stages: Sequence[Schedulable], finished: set[str]) -> None:
-    known = {stage.id for stage in stages} | finished
-    missing = [f"{stage.id} needs {name}" for stage in stages for name in stage.needs if name not in known]
-    if missing:
-        raise PlanError(f"{'; '.join(missing)}: neither planned nor finished")
 
 
 def _priorities(

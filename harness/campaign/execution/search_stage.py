@@ -7,21 +7,32 @@ from pathlib import Path
 from typing import Any
 
 from harness.campaign.execution.player_factory import DRIVER, PlayerFactory
-from harness.campaign.execution.stage_run import Made, StageInputs, versions_since
+from harness.campaign.execution.stage_run import StageRun
 from harness.campaign.plan.stages import SearchStage
+from harness.campaign.storage.versions import versions_since
 from harness.config.tunable import Tunable
 from harness.errors import StageFailed
 from harness.evaluation.tables import table_of, write_csv
 from harness.files import make_folder, write_atomically
+from harness.road.scene.open_scene import OpenScene
 from harness.training.parameter_search import SearchSpec, Trial, best, run_search, version_of_search
 
-TABLE = "reconfiguration.csv"
 
+def carry_out_search(stage: SearchStage, run: StageRun, scene: OpenScene) -> tuple[dict[str, Any], list[Path]]:
+    """Carry out a search; the facts, and the files of the driver and of the table.
 
-def carry_out_search(stage: SearchStage, inputs: StageInputs) -> Made:
-    """Carry out a search. Raises as `PlayerFactory.player` does, StageFailed where the ego can't play."""
-    run, spec = inputs.run, _spec(stage, inputs)
-    file = run.folder.work(stage.id) / "trials.json"
+    Raises as `PlayerFactory.player` does, StageFailed where the ego can't play.
+    """
+    context = run.context
+    spec = SearchSpec(
+        scene=scene,
+        driver=context.external_driver(),
+        persona=context.ego_persona,
+        people=PlayerFactory(context=context, scene=scene).people(stage.opponent),
+        settings=context.document.reconfiguration,
+        parts=("reconfiguration", stage.seed, stage.name),
+    )
+    file = context.folder.work(stage.id) / "trials.json"
     versions = versions_since(file, version_of_search())
     try:
         trials = run_search(spec, file, run.on_progress, run.on_start)
@@ -29,23 +40,11 @@ def carry_out_search(stage: SearchStage, inputs: StageInputs) -> Made:
         raise StageFailed(f"{stage.id}: {error}") from error
     unplayed = sum(each.mean_payoff is None for each in trials)
     facts = {"trials": len(trials), "trials_unplayed": unplayed, "chosen_trial": best(trials), "versions": versions}
-    found, table = run.folder.policy(stage.id), file.with_name(TABLE)
+    found, table = context.folder.policy(stage.id), file.with_name("reconfiguration.csv")
     _write_driver(stage, spec, trials, found)
     labels = {"stage": stage.name, "persona": stage.persona, "seed": stage.seed}
     _write_table(trials, spec.driver.searched, labels, table)
-    return Made(facts=facts, files=[found / DRIVER, table])
-
-
-def _spec(stage: SearchStage, inputs: StageInputs) -> SearchSpec:
-    context = inputs.run.context
-    return SearchSpec(
-        scene=inputs.scene,
-        driver=context.external_driver(),
-        persona=context.ego_persona,
-        people=PlayerFactory.of(inputs).people(stage.opponent),
-        settings=context.document.reconfiguration,
-        parts=("reconfiguration", stage.seed, stage.name),
-    )
+    return facts, [found / DRIVER, table]
 
 
 def _write_driver(stage: SearchStage, spec: SearchSpec, trials: Sequence[Trial], folder: Path) -> None:

@@ -1,4 +1,4 @@
-"""What happens to a stage, as events; and carrying a stage out so that everything that happens is sent as an event.
+"""What happens to a stage, as events; and carrying a stage out in a worker, so that everything is sent as an event.
 
 The code that prepares something (loops that are compiled, nets that are merged) logs it to `harness.preparation`
 (`logging`), at INFO, with `done` and `total` of its parts in `extra`: it knows no campaign. Here the records become
@@ -8,19 +8,25 @@ events of the stage that waits.
 from __future__ import annotations
 
 import logging
+import os
+import tempfile
 import time
 import traceback
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any, Literal, TypeAlias
 
-from harness.campaign.execution.run_context import RunContext
-from harness.campaign.execution.stage_run import Attempt, StageRun, Work
+from harness.campaign.execution.stage_run import Attempt, RunContext, StageRun, Work
 from harness.campaign.plan.stages import Stage
+from harness.campaign.storage.locks import held_by_worker
+from harness.campaign.storage.run_folder import RunFolder
 from harness.errors import HarnessError, is_of_memory
+from harness.files import make_folder
 
 _PROGRESS_EVERY_S = 0.25
+_LOST_S = 120.0  # the time that a process on a lost node has to end: Ray ends it, or the file system gives up its lock
 _LOGGER = logging.getLogger("harness.preparation")
 
 
@@ -42,45 +48,49 @@ class Event:
 Emit: TypeAlias = Callable[[Event], None]
 
 
-@dataclass(frozen=True, kw_only=True)
-class StageJob:
-    """A stage that a process is to carry out."""
+def carry_out_in_worker(stage: Stage, attempt: Attempt, *, context: RunContext, work: Work, send: Emit) -> Event:
+    """Carry a stage out in this process, which is registered in the run folder meanwhile.
 
-    stage: Stage
-    attempt: Attempt
-    context: RunContext
-    work: Work
+    Progress and starts of segments are sent; the last event, done or failed, is returned. What a stage raises is a
+    failure of this stage alone.
+    """
+    last_s = 0.0
 
-    def carry_out(self, send: Emit, registered: AbstractContextManager[object]) -> Event:
-        """Carry the stage out in this process, inside `registered`. Progress and starts of segments are sent; the last
-        event, done or failed, is returned. What a stage raises is a failure of this stage alone."""
-        stage, last = self.stage, 0.0
+    def on_progress(done: int, total: int) -> None:
+        nonlocal last_s
+        now_s = time.monotonic()
+        if now_s - last_s >= _PROGRESS_EVERY_S or done >= total:
+            last_s = now_s
+            send(Event(kind="progress", stage=stage.id, done=done, total=total))
 
-        def on_progress(done: int, total: int) -> None:
-            nonlocal last
-            now = time.monotonic()
-            if now - last >= _PROGRESS_EVERY_S or done >= total:
-                last = now
-                send(Event(kind="progress", stage=stage.id, done=done, total=total))
+    def on_start(place: int) -> None:
+        send(Event(kind="segment", stage=stage.id, done=place))
 
-        def on_start(place: int) -> None:
-            send(Event(kind="segment", stage=stage.id, done=place))
+    def on_preparation(what: str, done: int, total: int) -> None:
+        send(Event(kind="progress", stage=stage.id, done=done, total=total, message=what))
 
-        def on_preparation(what: str, done: int, total: int) -> None:
-            send(Event(kind="progress", stage=stage.id, done=done, total=total, message=what))
+    run = StageRun(context=context, attempt=attempt, on_progress=on_progress, on_start=on_start)
+    try:
+        _put_scratch_into(context.folder)
+        with held_by_worker(context.folder.workers, stage.id, _LOST_S), preparations_reported(on_preparation):
+            return Event(kind="done", stage=stage.id, info=work(stage, run))
+    except (HarnessError, OSError) as error:
+        return Event(kind="failed", stage=stage.id, message=str(error))
+    except Exception as error:
+        if is_of_memory(error):
+            message = f"the machine is short of memory: {error or 'none is left'}"
+        else:
+            message = traceback.format_exc()  # a bug: its traceback is the message
+        return Event(kind="failed", stage=stage.id, message=message)
 
-        run = StageRun(context=self.context, attempt=self.attempt, on_progress=on_progress, on_start=on_start)
-        try:
-            with registered, preparations_reported(on_preparation):
-                return Event(kind="done", stage=stage.id, info=self.work(stage, run))
-        except (HarnessError, OSError) as error:
-            return Event(kind="failed", stage=stage.id, message=str(error))
-        except Exception as error:
-            if is_of_memory(error):
-                message = f"the machine is short of memory: {error or 'none is left'}"
-            else:
-                message = traceback.format_exc()  # a bug: its traceback is the message
-            return Event(kind="failed", stage=stage.id, message=message)
+
+@cache
+def _put_scratch_into(folder: RunFolder) -> None:
+    """Put the temporary files of this process into a run folder: the next command removes those of a worker that was
+    killed."""
+    make_folder(folder.scratch)
+    os.environ["TMPDIR"] = str(folder.scratch.resolve())
+    tempfile.tempdir = None
 
 
 OnPreparation: TypeAlias = Callable[[str, int, int], None]

@@ -9,24 +9,29 @@ from typing import Any
 import pandas as pd
 
 from harness.campaign.execution.player_factory import PlayerFactory
-from harness.campaign.execution.stage_run import Made, StageInputs, versions_since
+from harness.campaign.execution.stage_run import StageRun
 from harness.campaign.plan.budgets import training_settings
-from harness.campaign.plan.planned_drivers import SumoDriven, description
+from harness.campaign.plan.planned_drivers import SumoDriven, description, driver_in
 from harness.campaign.plan.stages import TrainingStage
+from harness.campaign.storage.versions import versions_since
 from harness.drivers.policy_file import persona_hash, policy_files, read_policy, write_policy
 from harness.errors import StageFailed
 from harness.evaluation.tables import table_of, write_csv
 from harness.files import make_folder
 from harness.game.roles import EGO, ROLES
+from harness.road.scene.open_scene import OpenScene
 from harness.training.early_stopping import RULE
-from harness.training.ppo import TrainingResult, train
+from harness.training.ppo import train
 from harness.training.training_games import LearningPlace, TrainingSpec
 
 
-def carry_out_training(stage: TrainingStage, inputs: StageInputs) -> Made:
-    """Train a player. Raises as `PlayerFactory.player` does, StageFailed where the training itself fails."""
-    run, spec = inputs.run, _spec(stage, inputs)
-    checkpoint = run.folder.work(stage.id) / "checkpoint.safetensors"
+def carry_out_training(stage: TrainingStage, run: StageRun, scene: OpenScene) -> tuple[dict[str, Any], list[Path]]:
+    """Train a player; the facts, and the files of policy and learning curve.
+
+    Raises as `PlayerFactory.player` does, StageFailed where the training itself fails.
+    """
+    folder, spec = run.context.folder, _spec(stage, run, scene)
+    checkpoint = folder.work(stage.id) / "checkpoint.safetensors"
     versions = versions_since(checkpoint)
     try:
         result = train(
@@ -34,7 +39,7 @@ def carry_out_training(stage: TrainingStage, inputs: StageInputs) -> Made:
             checkpoint=checkpoint,
             key=run.context.keys[stage.id],
             card=_policy_card(stage, spec),
-            tensorboard=run.folder.tensorboard(stage.id),
+            tensorboard=folder.tensorboard(stage.id),
             on_progress=run.on_progress,
             on_start=run.on_start,
         )
@@ -47,13 +52,20 @@ def carry_out_training(stage: TrainingStage, inputs: StageInputs) -> Made:
         "rule": RULE if spec.settings.early_convergence else "",
         "versions": versions,
     }
-    return Made(facts=facts, files=_write(stage, inputs, result))
+    make_folder(folder.policy(stage.id))
+    write_policy(result.policy, folder.policy(stage.id))
+    curve = pd.DataFrame([asdict(point) for point in result.progress.curve])
+    ends = [*[""] * (len(curve) - 1), result.stopped][: len(curve)]  # the reason for the end is in the last row
+    curve = curve.assign(stage=stage.name, persona=stage.persona, seed=stage.seed, stopped=ends)
+    table = folder.work(stage.id) / "training.csv"
+    write_csv(table_of("training", curve.to_dict("records")), table)
+    return facts, [*policy_files(folder.policy(stage.id)), table]
 
 
-def _spec(stage: TrainingStage, inputs: StageInputs) -> TrainingSpec:
-    context, players = inputs.run.context, PlayerFactory.of(inputs)
+def _spec(stage: TrainingStage, run: StageRun, scene: OpenScene) -> TrainingSpec:
+    context, players = run.context, PlayerFactory(context=run.context, scene=scene)
     return TrainingSpec(
-        scene=inputs.scene,
+        scene=scene,
         persona=context.ego_persona if stage.learner == EGO else context.persona(stage.persona),
         places=_places(stage, players),
         alone_share=stage.alone_share,
@@ -72,7 +84,7 @@ def _places(stage: TrainingStage, players: PlayerFactory) -> tuple[LearningPlace
         return (LearningPlace(player=EGO, drivers=(None, *players.people(stage.opponent))),)
     places = []
     for learner in range(1, len(players.scene.world.roles)):
-        drivers = [players.ego(stage.opponent), *players.people((SumoDriven(),))]
+        drivers = [players.player(driver_in(stage.opponent, 0)), *players.people((SumoDriven(),))]
         drivers[learner] = None
         places.append(LearningPlace(player=learner, drivers=tuple(drivers)))
     return tuple(places)
@@ -91,16 +103,3 @@ def _policy_card(stage: TrainingStage, spec: TrainingSpec) -> dict[str, Any]:
         "began_from": stage.initial.stage if stage.initial is not None else None,
         "training": spec.settings.model_dump(mode="json"),
     }
-
-
-def _write(stage: TrainingStage, inputs: StageInputs, result: TrainingResult) -> list[Path]:
-    """Write the policy and the learning curve, with the reason for the end in its last row."""
-    folder = inputs.run.folder
-    make_folder(folder.policy(stage.id))
-    write_policy(result.policy, folder.policy(stage.id))
-    curve = pd.DataFrame([asdict(point) for point in result.progress.curve])
-    ends = [*[""] * (len(curve) - 1), result.stopped][: len(curve)]
-    curve = curve.assign(stage=stage.name, persona=stage.persona, seed=stage.seed, stopped=ends)
-    table = folder.work(stage.id) / "training.csv"
-    write_csv(table_of("training", curve.to_dict("records")), table)
-    return [*policy_files(folder.policy(stage.id)), table]

@@ -13,24 +13,16 @@ import signal
 import socket
 import subprocess
 import sys
-import tempfile
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from functools import cache
 from multiprocessing.connection import Connection, wait
-from pathlib import Path
-from types import TracebackType
 
-from harness.campaign.execution.run_context import RunContext
 from harness.campaign.execution.run_stage import carry_out
-from harness.campaign.execution.stage_events import Event, StageJob
-from harness.campaign.execution.stage_run import Attempt, Work
+from harness.campaign.execution.stage_events import Event, carry_out_in_worker
+from harness.campaign.execution.stage_run import Attempt, RunContext, Work
 from harness.campaign.plan.stages import Stage
-from harness.campaign.storage.locks import register_worker
-from harness.campaign.storage.run_folder import RunFolder
-from harness.files import make_folder
 
 _TERMINATING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 _PROGRAM = "import json, sys; sys.path[:] = json.loads(sys.argv[2]); from {0} import serve; serve(int(sys.argv[1]))"
@@ -83,33 +75,10 @@ def serve(descriptor: int) -> None:
         work, context = connection.recv()
         while True:
             stage, attempt = connection.recv()
-            job = StageJob(stage=stage, attempt=attempt, context=context, work=work)
-            connection.send(job.carry_out(connection.send, _registered(context.folder)))
+            last = carry_out_in_worker(stage, attempt, context=context, work=work, send=connection.send)
+            connection.send(last)
     except (EOFError, OSError):  # the parent is gone
         return
-
-
-@contextmanager
-def _registered(run: Path) -> Iterator[None]:
-    """This process is registered as a worker of a run folder, from the first time until it ends."""
-    _register(run)
-    yield
-
-
-@cache
-def _register(run: Path) -> None:
-    put_scratch_into(run)
-    register_worker(RunFolder(run).workers)
-
-
-@cache
-def put_scratch_into(run: Path) -> None:
-    """Put the temporary files of this process into a run folder: the next command removes those of a worker that was
-    killed."""
-    folder = RunFolder(run)
-    make_folder(folder.scratch)
-    os.environ["TMPDIR"] = str(folder.scratch.resolve())
-    tempfile.tempdir = None
 
 
 def _taken_input() -> int:
@@ -149,13 +118,8 @@ class WorkerPool:
 
     def __init__(self, context: RunContext, stages_left: int, jobs: int, work: Work = carry_out) -> None:
         self._context, self._work = context, work
-        self._count = min(jobs, stages_left)
+        self.capacity = min(jobs, stages_left)
         self._workers: list[_Worker] = []
-
-    @property
-    def capacity(self) -> int:
-        """The number of processes."""
-        return self._count
 
     def submit(self, stage: Stage, attempt: Attempt) -> None:
         """Give a stage to an idle worker."""
@@ -175,50 +139,37 @@ class WorkerPool:
 
     def __enter__(self) -> WorkerPool:
         try:
-            while len(self._workers) < self._count:
-                self._workers.append(self._spawn())
+            while len(self._workers) < self.capacity:
+                self._workers.append(_Worker(*start_process(self._work, self._context)))
         except BaseException:
-            self._end()
+            self.__exit__()
             raise
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self._end()
-
-    def _event_of(self, worker: _Worker) -> Event:
-        event = _receive(worker)
-        if event.kind == "crashed":
-            self._replace(worker)
-        if event.kind in ("crashed", "done", "failed"):
-            worker.stage = None
-        return event
-
-    def _spawn(self) -> _Worker:
-        return _Worker(*start_process(self._work, self._context))
-
-    def _replace(self, worker: _Worker) -> None:
-        _wait_for(worker)
-        fresh = self._spawn()
-        worker.process, worker.connection = fresh.process, fresh.connection
-
-    def _end(self) -> None:
+    def __exit__(self, *exception: object) -> None:
         for worker in self._workers:
             worker.process.terminate()
         for worker in self._workers:
             _wait_for(worker)
 
+    def _event_of(self, worker: _Worker) -> Event:
+        """The next event of a worker; its crash, if it ended without one."""
+        assert worker.stage is not None
+        try:
+            event: Event = worker.connection.recv()
+        except (EOFError, OSError):  # it closed the connection, so it is ending
+            code = self._replace(worker)
+            cause = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+            event = Event(kind="crashed", stage=worker.stage.id, message=f"the worker died of {cause}")
+        if event.kind in ("crashed", "done", "failed"):
+            worker.stage = None
+        return event
 
-def _receive(worker: _Worker) -> Event:
-    """The next event of a worker; its crash, if it ended without one."""
-    assert worker.stage is not None
-    try:
-        event: Event = worker.connection.recv()
-    except (EOFError, OSError):  # it closed the connection, so it is ending
-        cause = _cause(_wait_for(worker))
-        return Event(kind="crashed", stage=worker.stage.id, message=f"the worker died of {cause}")
-    return event
+    def _replace(self, worker: _Worker) -> int:
+        """Wait for a worker that is ending, and start another one in its place. Returns its exit code."""
+        code = _wait_for(worker)
+        worker.process, worker.connection = start_process(self._work, self._context)
+        return code
 
 
 def _wait_for(worker: _Worker) -> int:
@@ -232,9 +183,3 @@ def _wait_for(worker: _Worker) -> int:
     if worker.process.stdin is not None:
         worker.process.stdin.close()
     return worker.process.returncode
-
-
-def _cause(exitcode: int) -> str:
-    if exitcode < 0:
-        return signal.Signals(-exitcode).name
-    return f"exit code {exitcode}"

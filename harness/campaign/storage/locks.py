@@ -35,14 +35,6 @@ def only_one(file: Path) -> Iterator[None]:
         lock.release()
 
 
-def register_worker(folder: Path) -> None:
-    """Register this process in a folder until it ends: `wait_for_workers` waits for that."""
-    folder.mkdir(exist_ok=True)
-    lock = _lock(folder / f"{os.getpid()}.lock")
-    _acquire(lock)
-    _registered.append(lock)
-
-
 @contextlib.contextmanager
 def held_by_worker(folder: Path, name: str, timeout_s: float) -> Iterator[None]:
     """Register this process in a folder under a name, during the block: `wait_for_workers` waits for that.
@@ -72,9 +64,6 @@ def is_held(file: Path) -> bool:
         return False
     lock.release()
     return False
-
-
-_registered: list[FileLock] = []  # a lock is released when its object is gone
 
 
 def wait_for_workers(folder: Path, timeout_s: float) -> None:

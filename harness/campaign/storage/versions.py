@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import importlib.metadata
+import json
 import platform
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
+from types import MappingProxyType
 
+from harness.files import write_atomically
 from harness.version import __version__
 
 _PACKAGES = (
@@ -45,3 +49,16 @@ def versions() -> dict[str, str]:
 def versions_of_numbers() -> dict[str, str]:
     """The versions that a stage's numbers depend on: with others the numbers may differ."""
     return {name: versions()[name] for name in _OF_NUMBERS}
+
+
+def versions_since(checkpoint: Path, also: Mapping[str, str] = MappingProxyType({})) -> list[dict[str, str]]:
+    """The versions that make a training or search: several, if it continues what other versions started. They are
+    stored beside its checkpoint."""
+    file, now = checkpoint.with_name("versions.json"), {**versions_of_numbers(), **also}
+    try:
+        before = json.loads(file.read_text(encoding="utf-8")) if checkpoint.is_file() else []
+    except (OSError, ValueError):
+        before = []
+    versions = [*before, now] if isinstance(before, list) and now not in before else before or [now]
+    write_atomically(file, json.dumps(versions).encode())
+    return versions

@@ -51,7 +51,7 @@ def told(events: list[Event], kind: str) -> list[str]:
 
 
 def note(stage: Stage, run: StageRun) -> dict[str, Any]:
-    with (run.context.folder / "done").open("a") as file:
+    with (run.context.folder.path / "done").open("a") as file:
         file.write(f"{stage.id}\n")
     return {"pid": os.getpid(), "deaf": signal.getsignal(signal.SIGINT) == signal.SIG_IGN}
 
@@ -77,7 +77,7 @@ def die_in_b(stage: Stage, run: StageRun) -> dict[str, Any]:
 
 
 def die_once(stage: Stage, run: StageRun) -> dict[str, Any]:
-    mark = run.context.folder / stage.id
+    mark = run.context.folder.path / stage.id
     if not mark.exists():
         mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -17,99 +18,61 @@ from tests.support.repository import REPOSITORY
 HOLD = """
 import sys
 from pathlib import Path
-from harness.campaign.storage.locks import held_by_worker, only_one, register_worker
-path = Path(sys.argv[2])
-if sys.argv[1] == "worker":
-    register_worker(path)
+from harness.campaign.storage.locks import held_by_worker, only_one
+path, stage = Path(sys.argv[1]), sys.argv[2]
+with held_by_worker(path, stage, 0.0) if stage else only_one(path):
     print("has it", flush=True)
     sys.stdin.read()
-elif sys.argv[1] == "stage":
-    with held_by_worker(path, "a-seed1", 0.0):
-        print("has it", flush=True)
-        sys.stdin.read()
-else:
-    with only_one(path):
-        print("has it", flush=True)
-        sys.stdin.read()
 """
 
 
-def holder(kind: str, path: Path) -> subprocess.Popen[str]:
-    command = [sys.executable, "-c", HOLD, kind, str(path)]
+@contextmanager
+def holder(path: Path, stage: str = "") -> Iterator[int]:
+    """The id of a process that holds a lock: a command's, or the worker's of a stage. It is killed after the block."""
+    command = [sys.executable, "-c", HOLD, str(path), stage]
     process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=REPOSITORY)
-    assert process.stdout is not None
-    assert process.stdout.readline() == "has it\n"
-    return process
-
-
-def test_only_one__one_after_the_other(tmp_path: Path) -> None:
-    for _ in range(2):
-        with only_one(tmp_path / "lock"):
-            pass
+    try:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "has it\n"
+        yield process.pid
+    finally:
+        process.kill()
+        process.communicate()
 
 
 def test_only_one__the_holder_is_named_and_a_killed_one_leaves_nothing(tmp_path: Path) -> None:
-    other = holder("command", tmp_path / "lock")
-    try:
-        with pytest.raises(InUse, match=f"^process {other.pid}$"), only_one(tmp_path / "lock"):
+    with holder(tmp_path / "lock") as pid:
+        with pytest.raises(InUse, match=f"^process {pid}$"), only_one(tmp_path / "lock"):
             pytest.fail("two at once")
-    finally:
-        other.send_signal(signal.SIGKILL)
-        other.communicate()
-    with only_one(tmp_path / "lock"):
-        assert (tmp_path / "lock.owner").read_text() == f"process {os.getpid()}"
-
-
-def test_only_one__a_holder_that_left_no_name_is_another_process(tmp_path: Path) -> None:
-    other = holder("command", tmp_path / "lock")
-    try:
         (tmp_path / "lock.owner").unlink()
         with pytest.raises(InUse, match=r"^another process$"), only_one(tmp_path / "lock"):
             pytest.fail("two at once")
-    finally:
-        other.kill()
-        other.communicate()
+    for _ in range(2):
+        with only_one(tmp_path / "lock"):
+            assert (tmp_path / "lock.owner").read_text() == f"process {os.getpid()}"
 
 
-def test_wait_for_workers__until_every_worker_has_ended(tmp_path: Path) -> None:
-    wait_for_workers(tmp_path / "workers", 0.0)
-    workers = [holder("worker", tmp_path / "workers") for _ in range(2)]
-    for worker in workers:
-        with pytest.raises(InUse, match="a worker"):
-            wait_for_workers(tmp_path / "workers", 0.1)
-        worker.send_signal(signal.SIGKILL)
-        worker.communicate()
-    wait_for_workers(tmp_path / "workers", 0.0)
-    assert not list((tmp_path / "workers").iterdir())
-
-
-def test_held_by_worker__one_process_at_a_time_has_a_name(tmp_path: Path) -> None:
+def test_workers__are_waited_for_and_one_at_a_time_has_a_stage(tmp_path: Path) -> None:
     """As where the process of a lost node still writes: the next one waits, and the command counts it as a worker."""
-    other = holder("stage", tmp_path / "workers")
-    try:
-        with (
-            pytest.raises(StageFailed, match=r"^a-seed1: a process that was lost still has its lock, after 0\.1 s$"),
-            held_by_worker(tmp_path / "workers", "a-seed1", 0.1),
-        ):
-            pytest.fail("two at once")
-        with held_by_worker(tmp_path / "workers", "b-seed1", 0.1):
-            pass
-        with pytest.raises(InUse, match="a worker"):
-            wait_for_workers(tmp_path / "workers", 0.1)
-    finally:
-        other.send_signal(signal.SIGKILL)
-        other.communicate()
-    with held_by_worker(tmp_path / "workers", "a-seed1", 0.1):
+    workers = tmp_path / "workers"
+    wait_for_workers(workers, 0.0)
+    for stage in ("a-seed1", "c-seed1"):
+        with holder(workers, stage):
+            expected = rf"^{stage}: a process that was lost still has its lock, after 0\.1 s$"
+            with pytest.raises(StageFailed, match=expected), held_by_worker(workers, stage, 0.1):
+                pytest.fail("two at once")
+            with held_by_worker(workers, "b-seed1", 0.1):
+                pass
+            with pytest.raises(InUse, match="a worker"):
+                wait_for_workers(workers, 0.1)
+    with held_by_worker(workers, "a-seed1", 0.1):
         pass
-    wait_for_workers(tmp_path / "workers", 0.0)
+    wait_for_workers(workers, 0.0)
+    assert not list(workers.iterdir())
 
 
 def test_is_held__says_whether_a_process_has_a_lock(tmp_path: Path) -> None:
     assert not is_held(tmp_path / "lock")
-    other = holder("command", tmp_path / "lock")
-    try:
+    with holder(tmp_path / "lock"):
         assert is_held(tmp_path / "lock")
-    finally:
-        other.kill()
-        other.communicate()
     assert not is_held(tmp_path / "lock")
