@@ -7,15 +7,15 @@ A policy's folder is that of another run, or it has a driver document, `driver.t
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 from harness.campaign.plan.plan import plan
 from harness.config.campaign import Campaign
 from harness.config.persona import Persona
 from harness.config.toml_reading import nearest
-from harness.drivers.car import car_of
+from harness.drivers.car import Car, car_of
 from harness.drivers.external import ExternalDriver, find_driver
 from harness.drivers.policy_file import Policy, check_no_archive, persona_hash, policy_files, read_policy
 from harness.errors import Problem, UsageError, collect
@@ -25,15 +25,6 @@ from harness.shipped_documents import find_document
 
 DRIVER = "driver.toml"
 """The driver document in the folder of a policy that others trained."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class ReadPolicies:
-    """The policies that a campaign reads."""
-
-    files: Sequence[Path]
-    drivers: Mapping[str, ExternalDriver]
-    """Those of others, by the name of their folder."""
 
 
 def find_policies(file: Path, written: str | None, exist: bool = True) -> Path | None:
@@ -57,48 +48,48 @@ def check_policies(
     folder: Path,
     world: World,
     allow_code: bool,
-) -> ReadPolicies:
-    """Every policy that a campaign reads. Raises UsageError for each that is missing or does not fit, and for each that
-    runs code in files without permission (`allow_code`)."""
+) -> tuple[list[Path], dict[str, ExternalDriver]]:
+    """The files of every policy that a campaign reads, and the policies of others by the name of their folder.
+
+    Raises UsageError for each that is missing or does not fit, and for each that runs code in files without permission
+    (`allow_code`).
+    """
     available = {each.name for each in folder.iterdir() if each.is_dir()}
     by_name = {each.name: each for each in personas}
     problems: list[Problem] = []
     files: list[Path] = []
     drivers: dict[str, ExternalDriver] = {}
     for name in dict.fromkeys(name for stage in plan(document, list(by_name)) for name in stage.reads):
+        place = folder / name / DRIVER
         if name not in available:
             message = f"{document.policies!r} holds no policy {name!r}"
             problems.append(Problem(str(file), "policies", message, _alternatives(name, available)))
-            continue
-        if (folder / name / DRIVER).is_file():
+        elif place.is_file():
             person = by_name.get(name.rpartition("-seed")[0])
-            of_others = _find_and_try(folder / name / DRIVER, person or ego_persona, person is not None, world)
-            driver = collect(problems, lambda of_others=of_others: of_others(allow_code))  # type: ignore[misc]
+            sampled = (person or ego_persona).decisions == "sampled"
+            car = car_of(world, EGO if person is None else EGO + 1)
+            driver = collect(problems, partial(_find_and_try, place, allow_code, car, sampled))
             if driver is not None:
                 drivers[name] = driver
-                files += [folder / name / DRIVER, *map(Path, driver.files)]
-            continue
-        policy = collect(problems, lambda name=name: read_policy(folder / name))  # type: ignore[misc]
-        if policy is not None:
-            problems += _problems_of(policy, folder / name, ego_persona, by_name)
-        files += policy_files(folder / name)
+                files += [place, *map(Path, driver.files)]
+        else:
+            policy = collect(problems, partial(read_policy, folder / name))
+            if policy is not None:
+                problems += _problems_of(policy, folder / name, ego_persona, by_name)
+            files += policy_files(folder / name)
     if problems:
         raise UsageError(problems)
-    return ReadPolicies(files=files, drivers=drivers)
+    return files, drivers
 
 
-def _find_and_try(place: Path, persona: Persona, is_person: bool, world: World) -> Callable[[bool], ExternalDriver]:
-    """A function of the permission to run code, which finds a policy of others and tries it out."""
-
-    def find(allow_code: bool) -> ExternalDriver:
-        driver = find_driver(place.name, place, "", allow_code)
-        if driver.vehicle_type is not None:
-            message, remedy = "SUMO's models are no policy", "name them as the ego: [ego] driver"
-            raise UsageError.of(place, "kind", message, remedy)
-        driver.try_out(car_of(world, EGO + 1 if is_person else EGO), persona.decisions == "sampled")
-        return driver
-
-    return find
+def _find_and_try(place: Path, allow_code: bool, car: Car, sampled: bool) -> ExternalDriver:
+    """The policy of others that a driver document describes, tried out."""
+    driver = find_driver(place.name, place, "", allow_code)
+    if driver.vehicle_type is not None:
+        message, remedy = "SUMO's models are no policy", "name them as the ego: [ego] driver"
+        raise UsageError.of(place, "kind", message, remedy)
+    driver.try_out(car, sampled)
+    return driver
 
 
 def _problems_of(

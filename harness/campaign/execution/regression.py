@@ -6,6 +6,7 @@ import hashlib
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -59,7 +60,7 @@ class Regression:
         self._ego = None if ego == SUMO else find_driver(ego, Path("--ego"), "", allow_code)
         problems: list[Problem] = []
         self._scenes: dict[Path, OpenScene] = {}
-        opened = [collect(problems, lambda file=file: self._open(file)) for file in files]  # type: ignore[misc]
+        opened = [collect(problems, partial(self._open, file)) for file in files]
         if problems:
             raise UsageError(problems)
         self._games = [(file.stem, *game) for file, game in zip(files, opened, strict=True) if game is not None]

@@ -31,6 +31,7 @@ def check_names(file: Path, document: Campaign, personas: Sequence[str], tunable
     """Raises UsageError for every name that refers to nothing, or to two things; `tunable` as in `plan`."""
     _refuse(file, (*_personas(document, personas), *_other_egos(document)))
     _refuse(file, _arms(document, personas, tunable))
+    _refuse(file, _stages(document, personas, tunable))
 
 
 def _refuse(file: Path, found: _Found | Sequence[tuple[str, str, str]]) -> None:
@@ -102,3 +103,14 @@ def _arms(document: Campaign, personas: Sequence[str], tunable: bool) -> _Found:
         if name not in pairs:
             message = f"{name!r} is no arm of an ego and a persona" if name in arms else f"there is no arm {name!r}"
             yield "best_response.arms", message, nearest(name, pairs)
+
+
+def _stages(document: Campaign, personas: Sequence[str], tunable: bool) -> _Found:
+    """Stages are named after personas: two of them may have the same name."""
+    stages: dict[str, list[str]] = {}
+    for stage in plan(document.model_copy(update={"policies": None}), personas, tunable):
+        stages.setdefault(stage.id, []).append(stage.persona)
+    clashes = {tuple(sorted(filter(None, of))): name for name, of in stages.items() if len(of) > 1}
+    for of, name in clashes.items():
+        message = f"two stages would be called {name!r}, by persona {' and '.join(map(repr, of))}"
+        yield "personas", message, "give the persona another name"
