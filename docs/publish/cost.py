@@ -8,9 +8,9 @@ from pathlib import Path
 
 from benchmarks.campaign import TimedStage, makespan_s
 from harness.campaign.execution.worker_pool import cores
-from harness.campaign.plan.budgets import training_settings
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage
+from harness.campaign.plan.strategy_stages import training_settings
 from harness.campaign.preflight import OpenCampaign, open_campaign
 
 _HOUR_S = 3600.0

@@ -11,9 +11,9 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from harness.campaign.plan.budgets import training_settings
 from harness.campaign.plan.planned_drivers import BestOf, External, members_of, persona_of
 from harness.campaign.plan.stages import PreventabilityStage, SearchStage, Stage, TrainingStage
+from harness.campaign.plan.strategy_stages import training_settings
 from harness.campaign.preflight import OpenCampaign
 from harness.drivers.policy_file import policy_files
 from harness.drivers.reference_drivers import reference_identity

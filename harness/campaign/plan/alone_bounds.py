@@ -12,7 +12,6 @@ from harness.evaluation.strategies import (
     BestResponse,
     EgoStrategy,
     NaiveEgo,
-    NonEgoStrategy,
     OtherEgo,
     PersonaNonEgo,
     ReconfiguredEgo,
@@ -61,17 +60,11 @@ def _bounds(campaign: Campaign, strategy: Strategy) -> Iterator[AloneBound]:
             mixed = campaign.mixed_people.get(persona, ())
             members = [PersonaNonEgo(persona=each) for shares in mixed for each in shares]
             for non_ego in dict.fromkeys(members or [strategy]):
-                arm, share = Arm(non_ego=non_ego).name, asked.non_ego_goal_share
-                yield AloneBound(player="non_ego", words=_non_ego_in_words(non_ego), arm=arm, goal_share=share)
+                words, arm = f"the {strategy_name(non_ego)} driver", Arm(non_ego=non_ego).name
+                yield AloneBound(player="non_ego", words=words, arm=arm, goal_share=asked.non_ego_goal_share)
         case _:
-            arm, share = Arm(ego=strategy).name, asked.ego_goal_share
-            yield AloneBound(
-                player="ego", words=_ego_in_words(strategy, campaign.ego.driver), arm=arm, goal_share=share
-            )
-
-
-def _non_ego_in_words(strategy: NonEgoStrategy) -> str:
-    return f"the {strategy_name(strategy)} driver"
+            words, arm = _ego_in_words(strategy, campaign.ego.driver), Arm(ego=strategy).name
+            yield AloneBound(player="ego", words=words, arm=arm, goal_share=asked.ego_goal_share)
 
 
 def _ego_in_words(strategy: EgoStrategy, driver: str) -> str:

@@ -14,7 +14,7 @@ from harness.campaign.plan.planned_drivers import BestOf, Trained, TrainedBefore
 from harness.campaign.plan.stages import AssessmentStage, EquilibriumGate, Stage, TrainingStage, stage_id
 from harness.config.campaign import Campaign
 from harness.config.training import ATTENTIVE_SHARE
-from harness.evaluation.strategies import Arm, BestResponse
+from harness.evaluation.strategies import BestResponse
 from harness.game.roles import EGO, NON_EGO
 
 
@@ -25,24 +25,20 @@ def plan_best_responses(campaign: Campaign, pair: AssessmentStage) -> list[Stage
 
 def gate_of(campaign: Campaign, pair: AssessmentStage) -> EquilibriumGate:
     """The gate behind which there is nothing to do when neither player of a pair gains anything, and both can drive."""
-    ego, non_ego = (stage_id(_response_arm(pair, learner).name, pair.seed) for learner in (EGO, NON_EGO))
+    responses = (replace(pair.arm, best_response_of=learner) for learner in (EGO, NON_EGO))
+    ego, non_ego = (stage_id(arm.name, pair.seed) for arm in responses)
     bounds = tuple(each for each in alone_bounds(campaign, pair.arm) if each.goal_share > 0)
     alone = tuple(stage_id(each.arm, pair.seed) for each in bounds)
     return EquilibriumGate(pair=pair.id, ego_response=ego, non_ego_response=non_ego, alone=alone, bounds=bounds)
 
 
-def _response_arm(pair: AssessmentStage, learner: int) -> Arm:
-    return replace(pair.arm, best_response_of=learner)
-
-
 def _plan_response(campaign: Campaign, pair: AssessmentStage, learner: int) -> list[Stage]:
-    settings, arm = campaign.best_response, _response_arm(pair, learner)
+    assert campaign.best_response is not None
+    arm = replace(pair.arm, best_response_of=learner)
     (own,), other = pair.sides[learner], pair.sides[1 - learner]
-    assert settings is not None
-    present = own if isinstance(own, Trained | TrainedBefore) else None
     trainings = []
-    for start in range(1, settings.starts + 1):
-        initial = present if start == 1 else None
+    for start in range(1, campaign.best_response.starts + 1):
+        initial = own if start == 1 and isinstance(own, Trained | TrainedBefore) else None
         from_nothing = learner == NON_EGO and initial is None
         trainings.append(
             TrainingStage(

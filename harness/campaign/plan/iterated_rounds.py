@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 from harness.campaign.plan.best_responses import gate_of, plan_best_responses
 from harness.campaign.plan.planned_drivers import EquilibriumMixture, FixedMixture, Side, members_of
@@ -34,22 +35,14 @@ from harness.evaluation.strategies import (
     RetrainedEgo,
 )
 
-
-@dataclass(frozen=True, kw_only=True)
-class PlannedEgo:
-    """An ego strategy of a campaign."""
-
-    strategy: EgoStrategy
-    persona: str = ""
-    """The persona to whose rounds it belongs; empty: to none."""
-    gates: tuple[EquilibriumGate, ...] = ()
+StrategyT = TypeVar("StrategyT", bound=EgoStrategy | PersonaNonEgo)
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlannedNonEgo:
-    """A non-ego strategy of a campaign."""
+class Planned(Generic[StrategyT]):
+    """A strategy of a campaign, and the gates before its training."""
 
-    strategy: PersonaNonEgo
+    strategy: StrategyT
     gates: tuple[EquilibriumGate, ...] = ()
 
 
@@ -57,8 +50,8 @@ class PlannedNonEgo:
 class PersonaRounds:
     """All strategies of one persona's rounds, for one seed, and the stages of the rounds after the paper's."""
 
-    egos: list[PlannedEgo]
-    non_egos: list[PlannedNonEgo]
+    egos: list[Planned[EgoStrategy]]
+    non_egos: list[Planned[PersonaNonEgo]]
     stages: list[Stage]
 
 
@@ -66,38 +59,35 @@ def persona_rounds(of: SeedStages, persona: str, tunable: bool = False) -> Perso
     """All rounds of a persona. The stages of rounds 0 to 2 are those of `paper_rounds`."""
     campaign = of.campaign
     gates: tuple[EquilibriumGate, ...] = ()
-    rounds = PersonaRounds(
-        egos=[PlannedEgo(strategy=NaiveEgo(), persona=persona)],
-        non_egos=[PlannedNonEgo(strategy=PersonaNonEgo(persona=persona))],
-        stages=[],
-    )
+    egos = [Planned[EgoStrategy](strategy=NaiveEgo())]
+    non_egos = [Planned(strategy=PersonaNonEgo(persona=persona))]
+    stages: list[Stage] = []
+    rounds = PersonaRounds(egos=egos, non_egos=non_egos, stages=stages)
     if not ego_learns(campaign):
-        rounds.egos.extend([PlannedEgo(strategy=ReconfiguredEgo(against=persona), persona=persona)] if tunable else [])
+        egos.extend([Planned(strategy=ReconfiguredEgo(against=persona))] if tunable else [])
         return rounds
     iterates = not campaign.rounds.personas or persona in campaign.rounds.personas
     last = campaign.rounds.count if iterates else PAPER_ROUNDS
     for round_ in range(PAPER_ROUNDS, last + 1):
         learner_is_ego = round_ % 2 == 0
         if learner_is_ego:
-            ego = RetrainedEgo(against=persona, round=round_)
-            rounds.egos.append(PlannedEgo(strategy=ego, persona=persona, gates=gates))
+            egos.append(Planned(strategy=RetrainedEgo(against=persona, round=round_), gates=gates))
         else:
-            non_ego = PersonaNonEgo(persona=persona, round=round_)
-            rounds.non_egos.append(PlannedNonEgo(strategy=non_ego, gates=gates))
+            non_egos.append(Planned(strategy=PersonaNonEgo(persona=persona, round=round_), gates=gates))
         if round_ > PAPER_ROUNDS:
-            rounds.stages.extend(_plan_round(of, rounds, ego_learns=learner_is_ego))
+            stages.extend(_plan_round(of, rounds, ego_learns=learner_is_ego))
         if campaign.stops_early and learner_is_ego and round_ < last:
-            pair = pairing(of, rounds.egos[-1], rounds.non_egos[-1])
-            rounds.stages.extend(plan_best_responses(campaign, pair))
+            pair = pairing(of, egos[-1], non_egos[-1])
+            stages.extend(plan_best_responses(campaign, pair))
             gates = (*gates, gate_of(campaign, pair))
     return rounds
 
 
-def pairing(of: SeedStages, ego: PlannedEgo, non_ego: PlannedNonEgo) -> AssessmentStage:
+def pairing(of: SeedStages, ego: Planned[EgoStrategy], non_ego: Planned[PersonaNonEgo]) -> AssessmentStage:
     """The assessment of an ego strategy against a non-ego strategy."""
     # In the rounds of one persona a later strategy has the gates of the earlier ones; across personas each has its own.
     persona = non_ego.strategy.persona
-    same = ego.persona == persona
+    same = isinstance(ego.strategy, RetrainedEgo) and ego.strategy.against == persona
     gates = max(ego.gates, non_ego.gates, key=len) if same else (*ego.gates, *non_ego.gates)
     return of.assessment(Arm(ego=ego.strategy, non_ego=non_ego.strategy), persona=persona, gates=gates)
 
@@ -106,23 +96,29 @@ def _plan_round(of: SeedStages, rounds: PersonaRounds, *, ego_learns: bool) -> l
     """Train the latest strategy of a player, and assess it against the other player's latest and alone."""
     egos, non_egos = rounds.egos, rounds.non_egos
     persona = non_egos[0].strategy.persona
-    latest: PlannedEgo | PlannedNonEgo
-    others: Sequence[PlannedEgo | PlannedNonEgo]
+    strategy: EgoStrategy | PersonaNonEgo
     if ego_learns:
-        latest, others, before, alone = egos[-1], non_egos, (egos[:-1], non_egos), Arm(ego=egos[-1].strategy)
+        strategy, gates, alone = egos[-1].strategy, egos[-1].gates, Arm(ego=egos[-1].strategy)
+        others = [of.side(each.strategy) for each in non_egos]
+        before = egos[:-1], non_egos
     else:
-        latest, others, before, alone = non_egos[-1], egos, (egos, non_egos[:-1]), Arm(non_ego=non_egos[-1].strategy)
-    opponent, weighing = _opponent(of, [of.side(each.strategy) for each in others], *before)
+        strategy, gates, alone = non_egos[-1].strategy, non_egos[-1].gates, Arm(non_ego=non_egos[-1].strategy)
+        others = [of.side(each.strategy) for each in egos]
+        before = egos, non_egos[:-1]
+    opponent, weighing = _opponent(of, others, *before)
     return [
         *weighing,
-        of.training(latest.strategy, opponent, persona=persona, gates=latest.gates),
+        of.training(strategy, opponent, persona=persona, gates=gates),
         pairing(of, egos[-1], non_egos[-1]),
-        of.assessment(alone, persona=persona, gates=latest.gates),
+        of.assessment(alone, persona=persona, gates=gates),
     ]
 
 
 def _opponent(
-    of: SeedStages, others: Sequence[Side], egos: Sequence[PlannedEgo], non_egos: Sequence[PlannedNonEgo]
+    of: SeedStages,
+    others: Sequence[Side],
+    egos: Sequence[Planned[EgoStrategy]],
+    non_egos: Sequence[Planned[PersonaNonEgo]],
 ) -> tuple[Side, list[AssessmentStage]]:
     """The opponent in a training, one or several of the sides `others`; and the assessments by which it is weighed, if
     it is: those of `egos` against `non_egos`."""

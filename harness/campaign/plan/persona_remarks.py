@@ -15,27 +15,21 @@ from harness.game.world import World
 
 def persona_remarks(personas: Sequence[Persona], world: World, discount: float) -> list[str]:
     """A sentence for each payoff of a non-ego that does not suit the scene. `discount` is gamma of the training."""
-    places = range(NON_EGO, len(world.roles))
-    ends = any(lane_ends(world, player) for player in places)
-    signals = any(meets_signals(world, player) for player in places)
-    return [
-        f"warning: {persona.name}: {remark}"
-        for persona in personas
-        for remark in (*_of_lanes(persona, ends), *_of_waiting(persona, signals, world, discount))
-    ]
-
-
-def lane_ends(world: World, player: int) -> bool:
-    """Whether a lane on the player's route ends."""
-    routes = world.road.routes
-    rows = slice(int(routes.first_row[player]), int(routes.last_row[player]))
-    return bool(np.isfinite(routes.lane_end_m[rows]).any())
-
-
-def meets_signals(world: World, player: int) -> bool:
-    """Whether a traffic light is on the player's route."""
-    lines = world.right_of_way.stop_lines
-    return bool((lines.control[lines.player == player] == Control.SIGNAL).any())
+    routes, lines = world.road.routes, world.right_of_way.stop_lines
+    rows = zip(routes.first_row[NON_EGO:], routes.last_row[NON_EGO:], strict=True)
+    a_lane_ends = any(np.isfinite(routes.lane_end_m[first:last]).any() for first, last in rows)
+    has_signals = bool((lines.control[lines.player >= NON_EGO] == Control.SIGNAL).any())
+    remarks = []
+    for persona in personas:
+        found = [] if a_lane_ends else [*_of_lanes(persona)]
+        waiting, crash = waiting_cost(persona, world, discount), crash_cost(persona)
+        if has_signals and waiting > crash:
+            found.append(
+                f"a crash costs {crash:g}, and a long wait at a red light {waiting:.3g} (discounted by {discount:g} a "
+                "step): the person may prefer the crash. Raise collision and rail, or lower time_pressure"
+            )
+        remarks += [f"warning: {persona.name}: {each}" for each in found]
+    return remarks
 
 
 def waiting_cost(persona: Persona, world: World, discount: float) -> float:
@@ -52,24 +46,13 @@ def crash_cost(persona: Persona) -> float:
     return persona.safety.weight * min(_weight(persona.safety.terms.get(name, 0.0)) for name in ("collision", "rail"))
 
 
-def _of_lanes(persona: Persona, ends: bool) -> Iterator[str]:
-    if ends:
-        return
+def _of_lanes(persona: Persona) -> Iterator[str]:
     for term in persona.human.fuzzy:
         if term.quantity == "lane_end_m" and (value := float(term.function(np.array([inf]))[0])) != 0.0:
             yield (
                 f"{term.name} asks how far the lane goes on, and no lane of its route ends: it is {value:g} per second "
                 "everywhere. Choose a persona that has something to decide in this scene"
             )
-
-
-def _of_waiting(persona: Persona, signals: bool, world: World, discount: float) -> Iterator[str]:
-    waiting, crash = waiting_cost(persona, world, discount), crash_cost(persona)
-    if signals and waiting > crash:
-        yield (
-            f"a crash costs {crash:g}, and a long wait at a red light {waiting:.3g} (discounted by {discount:g} a "
-            "step): the person may prefer the crash. Raise collision and rail, or lower time_pressure"
-        )
 
 
 def _weight(value: float | Parametrised) -> float:

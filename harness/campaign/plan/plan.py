@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from harness.campaign.plan.best_responses import plan_best_responses
-from harness.campaign.plan.iterated_rounds import PersonaRounds, PlannedEgo, pairing, persona_rounds
+from harness.campaign.plan.iterated_rounds import PersonaRounds, Planned, pairing, persona_rounds
 from harness.campaign.plan.paper_rounds import plan_paper_rounds, plan_robust, plan_searches
 from harness.campaign.plan.stages import AssessmentStage, PreventabilityStage, Stage, TrainingStage
 from harness.campaign.plan.strategy_stages import SeedStages, crossplay_name, ego_learns
 from harness.config.campaign import Campaign
-from harness.evaluation.strategies import OtherEgo, ReconfiguredEgo, RetrainedEgo, RobustEgo
+from harness.evaluation.strategies import EgoStrategy, OtherEgo, ReconfiguredEgo, RetrainedEgo, RobustEgo
 
 
 def plan(campaign: Campaign, personas: Sequence[str], tunable: bool = False) -> list[Stage]:
@@ -74,12 +74,12 @@ def _plan_crossplay(of: SeedStages, rounds: Sequence[PersonaRounds]) -> list[Ass
     return [pairing(of, ego, non_ego) for ego in egos.values() for non_ego in non_egos]
 
 
-def _egos_of_no_persona(campaign: Campaign, has_round_2: bool) -> list[PlannedEgo]:
+def _egos_of_no_persona(campaign: Campaign, has_round_2: bool) -> list[Planned[EgoStrategy]]:
     """The egos that belong to no single persona: of populations, of several personas, or from outside."""
     round_2 = RetrainedEgo if ego_learns(campaign) else ReconfiguredEgo
-    strategies: list[RetrainedEgo | ReconfiguredEgo | RobustEgo | OtherEgo] = []
+    strategies: list[EgoStrategy] = []
     strategies += [round_2(against=each) for each in campaign.mixed_people] if has_round_2 else []
     strategies += [RobustEgo()] if ego_learns(campaign) and campaign.retraining.against else []
     written = campaign.crossplay.egos if campaign.crossplay is not None else []
     strategies += [OtherEgo(driver=crossplay_name(each)) for each in written]
-    return [PlannedEgo(strategy=each) for each in strategies]
+    return [Planned[EgoStrategy](strategy=each) for each in strategies]

@@ -6,8 +6,8 @@ mixture of personas in every place, and a crowd has a persona for each place: al
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import chain
 from typing import TypeAlias
 
 
@@ -88,11 +88,9 @@ def driver_in(side: Side, place: int) -> PlannedDriver | None:
 
 def members_of(*drivers: PlannedDriver) -> tuple[PlannedMember, ...]:
     """The drivers that may play: the members of mixtures and choices, or the drivers themselves."""
-    return tuple(
-        member
-        for driver in drivers
-        for member in (driver.members if isinstance(driver, FixedMixture | EquilibriumMixture | BestOf) else (driver,))
-    )
+    several = FixedMixture | EquilibriumMixture | BestOf
+    members = (driver.members if isinstance(driver, several) else (driver,) for driver in drivers)
+    return tuple(chain.from_iterable(members))
 
 
 def persona_of(driver: PlannedDriver) -> str:
@@ -102,24 +100,6 @@ def persona_of(driver: PlannedDriver) -> str:
             return persona
         case _:
             return ""
-
-
-def stages_before(driver: PlannedDriver) -> Iterable[str]:
-    """The stages of this plan that have to be done before a driver can play."""
-    for member in members_of(driver):
-        match member:
-            case Trained(stage=stage) | Reconfigured(stage=stage):
-                yield stage
-    if isinstance(driver, EquilibriumMixture):
-        for row in driver.arms:
-            yield from row
-
-
-def policies_before(driver: PlannedDriver) -> Iterable[str]:
-    """The policies of another run that a driver reads, each named after the stage that made it."""
-    for member in members_of(driver):
-        if isinstance(member, TrainedBefore):
-            yield member.stage
 
 
 def description(driver: PlannedDriver) -> str:

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import chain
 from typing import ClassVar
 
 from harness.campaign.plan.planned_drivers import (
+    EquilibriumMixture,
     PlannedDriver,
+    Reconfigured,
     Side,
     Trained,
     TrainedBefore,
     members_of,
-    policies_before,
-    stages_before,
 )
 from harness.evaluation.research_questions import AloneBound
 from harness.evaluation.strategies import Arm, BestResponse, ReconfiguredEgo, Strategy, player_of, strategy_name
@@ -73,13 +73,19 @@ class _Stage:
     @property
     def needs(self) -> tuple[str, ...]:
         """The stages that have to be done before."""
-        before = [stage for driver in self.drivers for stage in stages_before(driver)]
-        return _unique([*before, *(stage for gate in self.gates for stage in gate.stages)])
+        needed = [each.stage for each in members_of(*self.drivers) if isinstance(each, Trained | Reconfigured)]
+        for driver in self.drivers:
+            if isinstance(driver, EquilibriumMixture):
+                needed += chain.from_iterable(driver.arms)
+        for gate in self.gates:
+            needed += gate.stages
+        return tuple(dict.fromkeys(needed))
 
     @property
     def reads(self) -> tuple[str, ...]:
         """The policies of another run that it reads, each named after the stage that made it."""
-        return _unique(policy for driver in self.drivers for policy in policies_before(driver))
+        read = (each.stage for each in members_of(*self.drivers) if isinstance(each, TrainedBefore))
+        return tuple(dict.fromkeys(read))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,7 +105,6 @@ class TrainingStage(_Stage):
 
     @property
     def name(self) -> str:
-        """The strategy's name."""
         return strategy_name(self.strategy)
 
     @property
@@ -114,7 +119,6 @@ class TrainingStage(_Stage):
 
     @property
     def drivers(self) -> tuple[PlannedDriver, ...]:
-        """The initial policy and the opponent."""
         return (*((self.initial,) if self.initial is not None else ()), *self.opponent)
 
 
@@ -130,17 +134,14 @@ class AssessmentStage(_Stage):
 
     @property
     def name(self) -> str:
-        """The arm's name."""
         return self.arm.name
 
     @property
     def drivers(self) -> tuple[PlannedDriver, ...]:
-        """Those of the ego and of the non-egos."""
         return (*self.ego, *self.non_ego)
 
     @property
     def sides(self) -> tuple[Side, Side]:
-        """Ego and non-egos."""
         return self.ego, self.non_ego
 
     @property
@@ -166,7 +167,6 @@ class SearchStage(_Stage):
 
     @property
     def drivers(self) -> tuple[PlannedDriver, ...]:
-        """The opponent."""
         return self.opponent
 
 
@@ -185,12 +185,10 @@ class PreventabilityStage(_Stage):
 
     @property
     def drivers(self) -> tuple[PlannedDriver, ...]:
-        """Those of the arm."""
         return self.of.drivers
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """The arm, and what it needs."""
         return (self.of.id, *super().needs)
 
 
@@ -200,7 +198,3 @@ Stage = TrainingStage | AssessmentStage | SearchStage | PreventabilityStage
 def stage_id(name: str, seed: int) -> str:
     """A stage's name in the run folder."""
     return f"{name}-seed{seed}"
-
-
-def _unique(names: Iterable[str]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(names))

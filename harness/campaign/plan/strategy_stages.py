@@ -17,10 +17,12 @@ from harness.campaign.plan.planned_drivers import (
     SumoDriven,
     Trained,
     TrainedBefore,
+    members_of,
+    persona_of,
 )
 from harness.campaign.plan.stages import AssessmentStage, EquilibriumGate, TrainingStage, stage_id
 from harness.config.campaign import LEARNED, SUMO, Campaign
-from harness.config.training import ATTENTIVE_SHARE
+from harness.config.training import ATTENTIVE_SHARE, Training
 from harness.evaluation.strategies import (
     Arm,
     EgoStrategy,
@@ -33,7 +35,7 @@ from harness.evaluation.strategies import (
     player_of,
     strategy_name,
 )
-from harness.game.roles import NON_EGO
+from harness.game.roles import EGO, NON_EGO
 
 
 def ego_learns(campaign: Campaign) -> bool:
@@ -119,3 +121,21 @@ class SeedStages:
         if self.campaign.policies is None:
             return Trained(stage=stage, persona=persona)
         return TrainedBefore(stage=stage, persona=persona)
+
+
+def training_settings(campaign: Campaign, stage: TrainingStage) -> Training:
+    """The settings of one training, with its budget.
+
+    A person has no demonstrator, unless the campaign says so. A best response has a budget of its own. A training
+    that meets one of several personas in each game has the budget, and the segment length by which its learning curve
+    is judged, times their number.
+    """
+    settings = campaign.training
+    if stage.learner != EGO and not campaign.non_ego_training.imitation:
+        settings = settings.model_copy(update={"demonstration_steps": 0})
+    if stage.is_best_response:
+        assert campaign.best_response is not None
+        return settings.model_copy(update={"steps": campaign.best_response.steps})
+    personas = max((len({persona_of(each) for each in members_of(driver)}) for driver in stage.opponent), default=1)
+    more = {"steps": settings.steps * personas, "segment_steps": settings.segment_steps * personas}
+    return settings.model_copy(update=more)

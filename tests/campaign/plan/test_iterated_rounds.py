@@ -7,7 +7,6 @@ from typing import Any
 
 import pytest
 
-from harness.campaign.plan.budgets import training_settings
 from harness.campaign.plan.paper_rounds import plan_paper_rounds
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.planned_drivers import (
@@ -21,7 +20,7 @@ from harness.campaign.plan.planned_drivers import (
     members_of,
 )
 from harness.campaign.plan.stages import AssessmentStage, EquilibriumGate, Stage, TrainingStage
-from harness.campaign.plan.strategy_stages import SeedStages, crossplay_name
+from harness.campaign.plan.strategy_stages import SeedStages, crossplay_name, training_settings
 from harness.campaign.preflight import QUICK_RESPONSE_STEPS, open_campaign
 from harness.campaign.results.matchups import matchups_of
 from harness.drivers.policy_file import Policy, write_policy

@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 
 from harness.campaign.plan.alone_bounds import alone_bounds
-from harness.campaign.plan.budgets import training_settings
 from harness.campaign.plan.paper_rounds import questions
 from harness.campaign.plan.planned_drivers import FixedMixture, description, driver_in
 from harness.campaign.plan.stages import AssessmentStage, TrainingStage
+from harness.campaign.plan.strategy_stages import training_settings
 from harness.campaign.preflight import open_campaign
 from harness.errors import UsageError
 from harness.evaluation.strategies import NaiveEgo, against_persona
