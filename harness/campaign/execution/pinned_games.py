@@ -81,14 +81,12 @@ class PinnedGames:
         known = {(each.name, each.seed) for each in self._players.arms()}
         failed = self._failed()
         failed = failed[[(game.arm, game.seed) in known and arm in (None, game.arm) for game in failed.itertuples()]]
-        kinds: dict[tuple[str, int, str, str], list[int]] = {}
-        for game in worst_first(failed).itertuples():
-            cause = self._causes.get((game.arm, game.seed, game.episode), "")
-            kind = (str(game.arm), int(game.seed), str(game.ego_outcome), cause)
-            kinds.setdefault(kind, []).append(int(game.episode))
+        failed = worst_first(failed)
+        causes = [self._causes.get((game.arm, game.seed, game.episode), "") for game in failed.itertuples()]
+        kinds = failed.assign(cause=causes).groupby(["arm", "seed", "ego_outcome", "cause"], sort=False)["episode"]
         return [
-            RunFailure(arm=name, seed=seed, episode=episodes[0], alike=len(episodes))
-            for (name, seed, _, _), episodes in kinds.items()
+            RunFailure(arm=str(name), seed=int(seed), episode=int(episodes.iloc[0]), alike=len(episodes))
+            for (name, seed, _, _), episodes in kinds
         ]
 
     def failure(self, arm: str, seed: int, episode: int) -> RunFailure:

@@ -32,7 +32,6 @@ from harness.campaign.storage.run_folder import RunFolder
 from harness.config.driver import read_driver
 from harness.config.tunable import Adjustable
 from harness.drivers.car import car_of
-from harness.drivers.external import ExternalDriver
 from harness.drivers.mixture import Member, Mixture
 from harness.drivers.policy import LearnedDriver
 from harness.drivers.policy_file import read_policy
@@ -128,21 +127,17 @@ class PlayerFactory:
             case External(name=name):
                 return self.context.external_driver(name).make(car_of(self.scene.world, EGO), sampled)
             case Reconfigured(stage=stage):
-                found = _read_found(self.context.external_driver(), self.context.folder.policy(stage))
+                ego, file = self.context.external_driver(), self.context.folder.policy(stage) / DRIVER
+                document = read_driver(file)
+                if not isinstance(document, Adjustable):
+                    raise StageFailed(f"{file}: is not the result of a search")
+                found = ego.tuned({key: document.numbers[key] for key in ego.numbers})
                 return found.make(car_of(self.scene.world, EGO), sampled)
             case TrainedBefore(stage=stage) if stage in self.context.policy_drivers:
                 car = car_of(self.scene.world, EGO + 1 if persona_of(planned) else EGO)
                 return self.context.policy_drivers[stage].make(car, sampled)
             case Trained() | TrainedBefore():
                 return LearnedDriver(read_policy(self.policy_folder(planned)), sampled)
-
-
-def _read_found(ego: ExternalDriver, folder: Path) -> ExternalDriver:
-    """The ego with the parameters that a search wrote into this folder."""
-    document = read_driver(folder / DRIVER)
-    if not isinstance(document, Adjustable):
-        raise StageFailed(f"{folder / DRIVER}: is not the result of a search")
-    return ego.tuned({key: document.numbers[key] for key in ego.numbers})
 
 
 def equilibrium_of(mixture: EquilibriumMixture, folder: RunFolder) -> tuple[float, ...]:

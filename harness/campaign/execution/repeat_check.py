@@ -12,6 +12,8 @@ import hashlib
 import json
 from pathlib import Path
 
+from pydantic import TypeAdapter, ValidationError
+
 from harness.assessment.repeated_game import difference_when_repeated
 from harness.campaign.preflight import OpenCampaign
 from harness.campaign.storage.run_folder import RunFolder
@@ -45,12 +47,9 @@ def varying_drivers(campaign: OpenCampaign, folder: RunFolder | None = None) -> 
 
 def _known(file: Path) -> dict[str, str]:
     try:
-        known = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        return TypeAdapter(dict[str, str]).validate_json(file.read_bytes())
+    except (OSError, ValidationError):
         return {}
-    if not isinstance(known, dict):
-        return {}
-    return {str(key): text for key, text in known.items() if isinstance(text, str)}
 
 
 def _key(campaign: OpenCampaign, driver: ExternalDriver) -> str:

@@ -55,10 +55,13 @@ def run_campaign(
         keys = stage_keys(campaign, stages)
         with console.status(CHECKING):
             manifest = _ManifestKeeper(campaign, folder, stages=stages, keys=keys, varying=varying)
-            scene = campaign.scene.document
-            folder.keep_scene(campaign.scene.folder, scene.files)
-            finished = [stage.id for stage in stages if manifest.status(stage) in FINISHED]
-            _log_plan(campaign, stages, finished)
+            folder.keep_scene(campaign.scene.folder, campaign.scene.document.files)
+            finished = [name for name, entry in manifest.content["stages"].items() if entry["status"] in FINISHED]
+            quick = ", quick" if campaign.quick else ""
+            words = "campaign %s%s: %d stages, %d finished"
+            LOGGER.info(words, campaign.document.name, quick, len(stages), len(finished))
+            for stage in stages:
+                LOGGER.debug("%s %s", "finished" if stage.id in finished else "to do   ", stage.id)
             kept = kept_result(folder, manifest.content) if len(finished) == len(stages) else None
         if kept is not None:
             warn(mixed_versions(manifest.content["stages"]), console)
@@ -66,7 +69,8 @@ def run_campaign(
             LOGGER.info(NOTHING_TO_DO)
             return kept
         if len(finished) < len(stages):
-            manifest.warn_of_versions(console)
+            left = {"what is left": {"kind": "", "status": "done", "versions": [versions_of_numbers()]}}
+            warn(mixed_versions(manifest.content["stages"] | left), console)
             with StageProgress(stages, len(finished), console) as progress:
 
                 def emit(event: Event) -> None:
@@ -87,13 +91,6 @@ def run_campaign(
         return write_results(folder, console)
 
 
-def _log_plan(campaign: OpenCampaign, stages: Sequence[Stage], finished: Sequence[str]) -> None:
-    quick = ", quick" if campaign.quick else ""
-    LOGGER.info("campaign %s%s: %d stages, %d finished", campaign.document.name, quick, len(stages), len(finished))
-    for stage in stages:
-        LOGGER.debug("%s %s", "finished" if stage.id in finished else "to do   ", stage.id)
-
-
 def log_event(event: Event) -> None:
     """Write an event of a stage into the run's log. Progress is not logged."""
     levels = {"failed": logging.ERROR, "crashed": logging.WARNING, "skipped": logging.WARNING}
@@ -102,7 +99,7 @@ def log_event(event: Event) -> None:
 
 
 class _ManifestKeeper:
-    """Keeps the manifest in step with what happens."""
+    """Keeps the manifest in step with what happens. `content` is the manifest as it is on the disk."""
 
     def __init__(
         self,
@@ -114,8 +111,14 @@ class _ManifestKeeper:
         varying: Mapping[str, str],
     ) -> None:
         self._folder, self._campaign, self._plan = folder, campaign.document, stages
-        self._stages: Entries = {stage.id: _entry(stage, folder.finished(stage.id, keys[stage.id])) for stage in stages}
-        self._manifest: dict[str, Any] = {
+        self._entries: Entries = {}
+        """Those of the manifest, without the judgements of trainings."""
+        for stage in stages:
+            about = {"kind": stage.kind, "name": stage.name, "persona": stage.persona, "seed": stage.seed}
+            self._entries[stage.id] = {**about, "status": "pending", "message": ""}
+            if (info := folder.finished(stage.id, keys[stage.id])) is not None:
+                self._entries[stage.id] |= {**info, "status": _status(info)}
+        self.content: dict[str, Any] = {
             "format": FORMAT,
             "name": campaign.document.name,
             "file": campaign.file.name,
@@ -130,26 +133,12 @@ class _ManifestKeeper:
             "versions": versions(),
         }
         if varying:
-            self._manifest["varying_drivers"] = dict(varying)
+            self.content["varying_drivers"] = dict(varying)
         self._write()
-
-    @property
-    def content(self) -> Mapping[str, Any]:
-        """The manifest as it is on the disk."""
-        return self._manifest
-
-    def status(self, stage: Stage) -> str:
-        """done, settled, failed or pending."""
-        return str(self._manifest["stages"][stage.id]["status"])
-
-    def warn_of_versions(self, console: Console) -> None:
-        """Warn if what is left will be made by other versions than what is done."""
-        now = {"what is left": {"kind": "", "status": "done", "versions": [versions_of_numbers()]}}
-        warn(mixed_versions(self._manifest["stages"] | now), console)
 
     def note(self, event: Event) -> None:
         """Write down what happened to a stage."""
-        entry = self._stages[event.stage]
+        entry = self._entries[event.stage]
         match event.kind:
             case "done":
                 entry.update({"message": "", **event.info}, status=_status(event.info))
@@ -163,22 +152,8 @@ class _ManifestKeeper:
 
     def _write(self) -> None:
         """Write the manifest with the judgement of each training, which depends on the arm that assesses its player."""
-        goals = recorded_goals(self._stages)
-        self._manifest["stages"] = judged(self._stages, self._campaign, self._plan, goals)
-        self._folder.write_manifest(self._manifest)
-
-
-def _entry(stage: Stage, info: Mapping[str, Any] | None) -> dict[str, Any]:
-    """A stage's entry in the manifest; `info` is what it made, if it is finished."""
-    entry = {
-        "kind": stage.kind,
-        "name": stage.name,
-        "persona": stage.persona,
-        "seed": stage.seed,
-        "status": "pending",
-        "message": "",
-    }
-    return {**entry, **info, "status": _status(info)} if info is not None else entry
+        self.content["stages"] = judged(self._entries, self._campaign, self._plan, recorded_goals(self._entries))
+        self._folder.write_manifest(self.content)
 
 
 def _status(info: Mapping[str, Any]) -> str:

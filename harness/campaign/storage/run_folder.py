@@ -77,15 +77,12 @@ class RunFolder:
         return self.path / "replays"
 
     def policy(self, stage: str) -> Path:
-        """The folder of the policy that a stage made."""
         return self.path / "policies" / stage
 
     def traces(self, stage: str) -> Path:
-        """The traces of an arm."""
         return self.path / "traces" / f"{stage}.parquet"
 
     def tensorboard(self, stage: str) -> Path:
-        """TensorBoard's event files of a training."""
         return self.path / "tensorboard" / stage
 
     def work(self, stage: str) -> Path:
@@ -147,10 +144,6 @@ class RunFolder:
         """Mark a stage as done. Everything it wrote is there; `files` are those that its numbers are read from."""
         write_checksums(self.work(stage) / "done.json", self.path, files, {"key": key, "info": dict(info)})
 
-    def drop_segments(self, stage: str) -> None:
-        """Remove the segments of an arm that is done: its files hold them."""
-        shutil.rmtree(self.segments(stage), ignore_errors=True)
-
     # --- the manifest --------------------------------------------------------------------------------------------
 
     def manifest(self) -> dict[str, Any]:
@@ -158,77 +151,65 @@ class RunFolder:
         try:
             content = content_of(self.manifest_file, _MOST_MANIFEST_BYTES)
         except (FileNotFoundError, NotADirectoryError):
-            raise UsageError.of(
-                self.path, "", f"is not a run folder: it has no {MANIFEST}", "name the folder a campaign wrote"
-            ) from None
+            message = f"is not a run folder: it has no {MANIFEST}"
+            raise UsageError.of(self.path, "", message, "name the folder a campaign wrote") from None
         except OSError as error:
             raise UsageError.of(self.manifest_file, "", f"is damaged: {error.strerror}", RUN_AGAIN) from None
         manifest = read_manifest(self.manifest_file, content)
-        self._check_links()
-        return manifest
-
-    def _check_links(self) -> None:
-        """Raises UsageError where the folder has a link that leads out of it: what it points to is not the run's."""
         for folder, folders, files in os.walk(self.path):
-            for name in (*folders, *files):
-                place = Path(folder) / name
-                if place.is_symlink() and leads_out(place, self.path):
+            for place in (Path(folder) / name for name in (*folders, *files)):
+                if place.is_symlink() and leads_out(place, self.path):  # what it points to is not the run's
                     message = "is a link that leads out of the run folder"
                     raise UsageError.of(place, "", message, "put there what it points to")
+        return manifest
 
     def check_whole(self, manifest: Mapping[str, Any]) -> None:
         """Raises UsageError where files of the stages are missing, as in a folder that was published without them, or
         are not what the stages wrote."""
         done = [name for name, entry in manifest["stages"].items() if entry["status"] == "done"]
         if done and not any(self.work(name).is_dir() for name in done):
-            raise UsageError.of(
-                self.path,
-                "",
-                "holds a report and its tables, but not the files that they are made from",
-                f"read its report.html, or play the games: run campaign {manifest['name']!r} again",
-            )
-        damaged = [file for name in done for file in self._damaged(name)]
+            message = "holds a report and its tables, but not the files that they are made from"
+            remedy = f"read its report.html, or play the games: run campaign {manifest['name']!r} again"
+            raise UsageError.of(self.path, "", message, remedy)
+        damaged: list[Path] = []
+        for name in done:
+            record = self.done(name)
+            damaged += [self.work(name) / "done.json"] if record is None else mismatches(record, self.path)
         damaged += [file for file in sorted(self.scene.glob("*")) if not _is_one_of(file, manifest["hashes"])]
         if damaged:
             message, remedy = "is missing, or is not what the campaign wrote", "run the campaign again"
             raise UsageError(Problem(str(file), "", message, remedy) for file in damaged)
 
-    def _damaged(self, stage: str) -> list[Path]:
-        """The files of a finished stage that are not what it wrote."""
-        record = self.done(stage)
-        return [self.work(stage) / "done.json"] if record is None else mismatches(record, self.path)
-
     def write_manifest(self, manifest: Mapping[str, Any]) -> None:
-        """Replace the manifest."""
         write_atomically(self.manifest_file, (json.dumps(manifest, indent=2) + "\n").encode())
 
     def claim(self, campaign: str, quick: bool = False) -> None:
         """Make the folder this campaign's. Raises UsageError if it belongs to another campaign, if it holds a full run
         and this is a quick one (or the reverse), or if it is not a run folder and not empty."""
         try:
-            self._check_owner(campaign, quick)
-            for name in ("policies", "traces", "tensorboard", ".stages"):
-                make_folder(self.path / name)
+            wrong = self._refusal(campaign, quick)
+            if not wrong:
+                for name in ("policies", "traces", "tensorboard", ".stages"):
+                    make_folder(self.path / name)
         except OSError as error:
-            raise UsageError.of(
-                self.path, "", f"can't be written: {error.strerror}", "choose a folder with --out"
-            ) from None
+            wrong = f"can't be written: {error.strerror}"
+        if wrong:
+            raise UsageError.of(self.path, "", wrong, "choose another folder with --out")
 
-    def _check_owner(self, campaign: str, quick: bool) -> None:
+    def _refusal(self, campaign: str, quick: bool) -> str:
+        """Why the folder can't be this campaign's; empty if it can."""
         if self.path.exists() and not self.path.is_dir():
-            raise UsageError.of(self.path, "", "is a file", "choose a folder with --out")
-        if self.manifest_file.exists():
-            manifest = self.manifest()
-            wrong = ""
-            if manifest["name"] != campaign:
-                wrong = f"belongs to campaign {manifest['name']!r}, not {campaign!r}"
-            elif manifest["quick"] != quick:
-                kinds = ("a full run, which a quick one", "a quick run, which a full one")
-                wrong = f"holds {kinds[not quick]} would overwrite"
-            if wrong:
-                raise UsageError.of(self.path, "", wrong, "choose another folder with --out")
-        elif self.path.is_dir() and not _has_only_locks(self.path):
-            raise UsageError.of(self.path, "", "is not empty and not a run folder", "choose another folder with --out")
+            return "is a file"
+        if not self.manifest_file.exists():
+            unknown = self.path.is_dir() and not _has_only_locks(self.path)
+            return "is not empty and not a run folder" if unknown else ""
+        manifest = self.manifest()
+        if manifest["name"] != campaign:
+            return f"belongs to campaign {manifest['name']!r}, not {campaign!r}"
+        if manifest["quick"] != quick:
+            kinds = ("a full run, which a quick one", "a quick run, which a full one")
+            return f"holds {kinds[not quick]} would overwrite"
+        return ""
 
     @contextmanager
     def held(self) -> Iterator[None]:
