@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from harness.campaign.preflight import QUICK_SEGMENT_STEPS, QUICK_STEPS, open_campaign
+from harness.campaign.preflight import QUICK_RESPONSE_STEPS, QUICK_SEGMENT_STEPS, QUICK_STEPS, open_campaign
 from harness.drivers.policy_file import write_policy
 from harness.errors import Problem, UsageError
 from tests.support.policies import some_policy
@@ -65,8 +65,10 @@ def test_open_campaign__quick_is_the_same_with_fewer_steps(repository: Path, tmp
     assert quick.reconfiguration.trials < full.reconfiguration.trials
     search = quick.reconfiguration.model_copy(update={"trials": full.reconfiguration.trials})
     assert quick.model_copy(update={"training": training, "reconfiguration": search}) == full
-    tiny = open_campaign(write_campaign(tmp_path), quick=True).document
+    tiny = open_campaign(write_campaign(tmp_path, best_response={"steps": 10**6}), quick=True).document
     assert tiny.training.steps == 2048  # never more than was asked for
+    assert tiny.best_response is not None
+    assert tiny.best_response.steps == QUICK_RESPONSE_STEPS
 
 
 def test_open_campaign__names_are_relative_to_the_campaigns_own_file(

@@ -26,6 +26,17 @@ def planned(folder: Path, **changes: Any) -> tuple[dict[str, Stage], dict[str, s
     return {stage.id: stage for stage in stages}, stage_keys(campaign, stages)
 
 
+def campaign_of(*personas: str, **changes: Any) -> Campaign:
+    """A campaign with these personas, without reference drivers. None of its files is read."""
+    document = {"name": "a", "scene": "b", "personas": list(personas), "assessment": {"reference_drivers": False}}
+    return Campaign.model_validate({**document, **changes})
+
+
+def stages_of(*personas: str, tunable: bool = False, **changes: Any) -> dict[str, Any]:
+    """The stages of `campaign_of`, by name and in order. It has one seed."""
+    return {stage.name: stage for stage in plan(campaign_of(*personas, **changes), personas, tunable)}
+
+
 def training_of(name: str, *needs: str) -> Stage:
     """A training that needs others: as its initial policy and as its opponent."""
     needed = tuple(Trained(stage=f"{each}-seed1") for each in needs)

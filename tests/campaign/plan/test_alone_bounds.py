@@ -21,12 +21,13 @@ from harness.evaluation.strategies import (
     RobustEgo,
     SumoNonEgo,
 )
+from tests.support.plans import campaign_of
 
 ANNA = PersonaNonEgo(persona="anna")
 
 
 def campaign(**changes: Any) -> Campaign:
-    return Campaign.model_validate({"name": "a", "scene": "b", "personas": ["anna.toml", "bert.toml"], **changes})
+    return campaign_of("anna", "bert", **changes)
 
 
 TOWN = {"name": "town", "shares": {"anna": 1.0, "bert": 3.0}}
@@ -70,19 +71,20 @@ def test_bounds__are_the_campaigns() -> None:
     assert (ego.words, person.words) == ("the naive ego", "the anna driver")
 
 
-def test_questions__rq2_also_asks_the_retrained_ego() -> None:
-    rq1, rq2, *_ = questions(campaign(), ["anna", "bert"])
-    assert [each.arm for each in rq1.alone] == ["naive_alone", "anna_alone"]
-    assert [each.arm for each in rq2.alone] == ["naive_alone", "anna_alone", "retrained_alone_anna"]
-
-
-@pytest.mark.parametrize("driver", ["sumo", "../egos/adas.toml"])
-@pytest.mark.parametrize("tunable", [False, True])
-def test_questions__an_ego_that_does_not_learn_has_to_drive_as_well(driver: str, tunable: bool) -> None:
+@pytest.mark.parametrize(
+    ("driver", "tunable", "round_2"),
+    [
+        ("learned", False, ["retrained_alone_anna"]),
+        ("sumo", False, None),
+        ("egos/adas.toml", False, None),
+        ("egos/adas.toml", True, ["reconfigured_alone_anna"]),
+    ],
+)
+def test_questions__ask_the_players_of_both_arms(driver: str, tunable: bool, round_2: list[str] | None) -> None:
     asked = questions(campaign(ego={"driver": driver}), ["anna"], tunable)
-    alone = [[each.arm for each in question.alone] for question in asked]
-    rq2 = [["naive_alone", "anna_alone", "reconfigured_alone_anna"]] if tunable else []
-    assert alone == [["naive_alone", "anna_alone"], *rq2]
+    rq1 = ["naive_alone", "anna_alone"]
+    expected = [rq1] if round_2 is None else [rq1, rq1 + round_2]
+    assert [[each.arm for each in question.alone] for question in asked] == expected
 
 
 @pytest.mark.parametrize(

@@ -7,15 +7,11 @@ from typing import Any
 
 import pytest
 
-from harness.campaign.plan.alone_bounds import alone_bounds
 from harness.campaign.plan.paper_rounds import questions
 from harness.campaign.plan.planned_drivers import FixedMixture, description, driver_in
-from harness.campaign.plan.stages import AssessmentStage, TrainingStage
-from harness.campaign.plan.strategy_stages import training_settings
 from harness.campaign.preflight import open_campaign
 from harness.errors import UsageError
-from harness.evaluation.strategies import NaiveEgo, against_persona
-from tests.support.plans import planned
+from tests.support.plans import campaign_of, planned, stages_of
 from tests.support.scenes import THREE_PEOPLE, build_scene
 from tests.support.tiny import MERGE, TRAINING, write_campaign, write_persona
 
@@ -32,53 +28,36 @@ def personas(tmp_path: Path) -> list[str]:
     return [str(write_persona(tmp_path, name)) for name in ("anna", "bert")]
 
 
-def test_plan__a_crowd_is_met_and_trained_against_like_a_persona(
-    scene: str, personas: list[str], tmp_path: Path
-) -> None:
-    stages, _ = planned(tmp_path, scene=scene, personas=personas, crowd=[MIXED])
+def test_plan__a_crowd_is_met_and_trained_against_like_a_persona() -> None:
+    stages = stages_of("anna", "bert", crowd=[MIXED])
     people = ["anna-seed1", "bert-seed1", "anna-seed1"]
-    arms = {name: stage for name, stage in stages.items() if isinstance(stage, AssessmentStage) and "mixed" in name}
-    assert {name: [*map(description, stage.drivers)] for name, stage in arms.items()} == {
-        "naive_vs_mixed-seed1": ["naive-seed1", *people],
-        "retrained_vs_mixed-seed1": ["retrained_mixed-seed1", *people],
-        "retrained_alone_mixed-seed1": ["retrained_mixed-seed1"],
+    training = stages.pop("retrained_mixed")
+    assert {name: [*map(description, stage.drivers)] for name, stage in stages.items() if "mixed" in name} == {
+        "naive_vs_mixed": ["naive-seed1", *people],
+        "retrained_vs_mixed": ["retrained_mixed-seed1", *people],
+        "retrained_alone_mixed": ["retrained_mixed-seed1"],
     }
-    training = stages["retrained_mixed-seed1"]
-    assert isinstance(training, TrainingStage)
     assert [*map(description, training.opponent)] == people
     assert training.needs == ("anna-seed1", "bert-seed1")
 
 
-def test_plan__a_population_draws_a_persona_for_each_place(scene: str, personas: list[str], tmp_path: Path) -> None:
+def test_plan__a_population_draws_a_persona_for_each_place() -> None:
     town = {"name": "town", "shares": {"anna": 1.0, "bert": 3.0}}
-    stages, _ = planned(tmp_path, scene=scene, personas=personas, population=[town])
-    arm = stages["naive_vs_town-seed1"]
-    assert isinstance(arm, AssessmentStage)
-    in_places = [driver_in(arm.non_ego, place) for place in range(3)]
-    assert in_places == [in_places[0]] * 3
-    assert isinstance(in_places[0], FixedMixture)
-    assert in_places[0].shares == (1.0, 3.0)
+    arm = stages_of("anna", "bert", population=[town])["naive_vs_town"]
+    first, *others = (driver_in(arm.non_ego, place) for place in range(3))
+    assert others == [first] * 2
+    assert isinstance(first, FixedMixture)
+    assert first.shares == (1.0, 3.0)
 
 
-def test_plan__questions_about_a_crowd_ask_each_of_its_personas_to_drive_alone(
-    scene: str, personas: list[str], tmp_path: Path
-) -> None:
-    campaign = open_campaign(write_campaign(tmp_path, scene=scene, personas=personas, crowd=[MIXED], competence=None))
-    asked = [each for each in questions(campaign.document, ["anna", "bert"]) if each.persona == "mixed"]
+def test_plan__questions_about_a_crowd_ask_each_of_its_personas_to_drive_alone() -> None:
+    campaign = campaign_of("anna", "bert", crowd=[MIXED])
+    asked = [each for each in questions(campaign, ["anna", "bert"]) if each.persona == "mixed"]
     assert [(each.question, each.baseline, each.treatment) for each in asked] == [
         ("RQ1", "naive_alone", "naive_vs_mixed"),
         ("RQ2", "naive_vs_mixed", "retrained_vs_mixed"),
     ]
-    bounds = alone_bounds(campaign.document, against_persona(NaiveEgo(), "mixed"))
-    assert [each.arm for each in bounds] == ["naive_alone", "anna_alone", "bert_alone"]
-
-
-def test_plan__a_crowd_does_not_multiply_the_budget(scene: str, personas: list[str], tmp_path: Path) -> None:
-    file = write_campaign(tmp_path, scene=scene, personas=personas, crowd=[MIXED])
-    stages, _ = planned(tmp_path, scene=scene, personas=personas, crowd=[MIXED])
-    training = stages["retrained_mixed-seed1"]
-    assert isinstance(training, TrainingStage)
-    assert training_settings(open_campaign(file).document, training).steps == TRAINING["steps"]
+    assert [each.arm for each in asked[0].alone] == ["naive_alone", "anna_alone", "bert_alone"]
 
 
 def test_keys__of_a_crowd_depend_on_who_is_in_which_place(scene: str, personas: list[str], tmp_path: Path) -> None:

@@ -5,29 +5,22 @@ from __future__ import annotations
 from pathlib import Path
 
 from harness.campaign.plan.stages import PreventabilityStage
-from tests.support.plans import planned
-
-JUDGED = {"assessment": {"episodes": 4, "reference_drivers": True}}
+from tests.support.plans import planned, stages_of
 
 
-def test_plan__each_arm_of_an_ego_against_a_persona_is_judged(tmp_path: Path) -> None:
-    stages, _ = planned(tmp_path, **JUDGED)
+def test_plan__each_arm_of_an_ego_against_a_persona_is_judged() -> None:
+    stages = stages_of("anna", assessment={"reference_drivers": True})
     judged = {name: each for name, each in stages.items() if isinstance(each, PreventabilityStage)}
-    assert set(judged) == {"naive_vs_speedy_preventability-seed1", "retrained_vs_speedy_preventability-seed1"}
+    assert set(judged) == {"naive_vs_anna_preventability", "retrained_vs_anna_preventability"}
     for name, stage in judged.items():
-        assert stage.needs[0] == name.replace("_preventability", "")
+        assert stage.needs[0] == f"{name.removesuffix('_preventability')}-seed1"
 
 
-def test_keys__of_other_stages_do_not_depend_on_it(tmp_path: Path) -> None:
-    _, keys = planned(tmp_path / "with", **JUDGED)
-    without, keys_without = planned(tmp_path / "without")
-    assert not any(isinstance(each, PreventabilityStage) for each in without.values())
+def test_keys__of_judgements_depend_on_their_arms_and_no_others_on_them(tmp_path: Path) -> None:
+    _, keys = planned(tmp_path / "with", assessment={"episodes": 4, "reference_drivers": True})
+    _, keys_without = planned(tmp_path / "without")
     assert {name: keys[name] for name in keys_without} == keys_without
-    assert len(keys) == len(keys_without) + 2
-
-
-def test_keys__a_judgement_depends_on_its_arm(tmp_path: Path) -> None:
-    _, keys = planned(tmp_path / "four", **JUDGED)
+    judged = keys.keys() - keys_without.keys()
+    assert len(judged) == 2
     _, more = planned(tmp_path / "five", assessment={"episodes": 5, "reference_drivers": True})
-    name = "naive_vs_speedy_preventability-seed1"
-    assert keys[name] != more[name]
+    assert all(keys[name] != more[name] for name in judged)
