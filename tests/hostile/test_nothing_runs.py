@@ -19,7 +19,7 @@ from tests.support.chromium import launched, opener
 from tests.support.pages import campaign, rendered
 from tests.support.recorded import SCENE, manoeuvres, recorded
 from tests.support.sources import SOURCES, label, tree_of
-from tests.support.tiny import HARNESS, PATIENCE_S
+from tests.support.tiny import harness
 
 # --- the source -------------------------------------------------------------------------------------------------------
 
@@ -106,9 +106,7 @@ def test_bomb__goes_off_when_it_is_unpickled(tmp_path: Path) -> None:
 
 
 def _run(folder: Path, *command: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [HARNESS, *map(str, command)], cwd=folder, capture_output=True, text=True, timeout=PATIENCE_S, check=False
-    )
+    return harness(*command, cwd=folder)
 
 
 @pytest.mark.parametrize("file", [TENSORS, CARD])

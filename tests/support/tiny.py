@@ -17,6 +17,7 @@ import pytest
 from harness.campaign.storage.run_log import LOG
 from harness.config.training import Training
 from harness.errors import NOT_ACCEPTED
+from tests.support.forked_command import can_fork, run_forked
 from tests.support.repository import REPOSITORY
 from tests.support.shared import built_once
 
@@ -100,6 +101,8 @@ def _inline(value: Any) -> str:
 def harness(*arguments: object, timeout_s: float = PATIENCE_S, **options: Any) -> subprocess.CompletedProcess[str]:
     """Run the command to its end."""
     command = [str(HARNESS), *map(str, arguments)]
+    if can_fork(options):
+        return run_forked(command, timeout_s=timeout_s, **options)
     return subprocess.run(command, capture_output=True, text=True, timeout=timeout_s, check=False, **options)
 
 
