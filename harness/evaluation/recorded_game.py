@@ -130,13 +130,11 @@ class RecordedGame:
         """[T, B]"""
         bodies, players = self.bodies, len(self.world.roles)
         others = slice(players, len(self.names) - len(self.obstacles))
-        result = np.ones(bodies.present.shape, dtype=bool)
-        away: FloatArray = np.full((len(result), others.stop - players), np.inf)
-        for player in range(players):
-            dx, dy = (each[:, others] - each[:, player, None] for each in (bodies.x_m, bodies.y_m))
-            away = np.where(bodies.present[:, player, None], np.minimum(away, np.hypot(dx, dy)), away)
-        away[~bodies.present[:, others]] = np.inf
+        dx, dy = (each[:, others, None] - each[:, None, :players] for each in (bodies.x_m, bodies.y_m))
+        both = bodies.present[:, others, None] & bodies.present[:, None, :players]
+        away = np.where(both, np.hypot(dx, dy), np.inf).min(-1)
         rank = away.argsort(axis=1, kind="stable").argsort(axis=1)
+        result = np.ones(bodies.present.shape, dtype=bool)
         result[:, others] = (away <= NOTICED_M) & (rank < NEAREST)
         return result
 

@@ -9,11 +9,10 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from harness.errors import UsageError
@@ -113,11 +112,8 @@ def read_csv(path: Path) -> pd.DataFrame:
         cells = list(zip(*lines, strict=True)) if lines else [()] * len(header)
         if len(cells) != len(header):
             raise ValueError("rows are not as long as the header")
-        return typed(
-            pd.DataFrame(
-                {name: _parse(column, columns[name].dtype) for name, column in zip(header, cells, strict=True)}
-            )
-        )
+        parsed = {name: _parse(column, columns[name].dtype) for name, column in zip(header, cells, strict=True)}
+        return typed(pd.DataFrame(parsed))
     except OSError as error:
         raise UsageError.of(path, "", f"can't be read: {error.strerror}", remedy) from error
     except (ValueError, OverflowError, csv.Error) as error:
@@ -127,11 +123,9 @@ def read_csv(path: Path) -> pd.DataFrame:
 def _parse(cells: Iterable[str], dtype: str) -> pd.Series:
     if dtype == TEXT:
         return pd.Series(list(cells), dtype=object)
-    if dtype == FLAG:
-        return pd.Series([_TRUTH.get(cell) for cell in cells], dtype=object)
-    if dtype == NUMBER:
-        return pd.Series([float(cell) if cell else np.nan for cell in cells], dtype="float64")
-    return pd.Series([int(cell) if cell else pd.NA for cell in cells], dtype="Int64")
+    readers: Mapping[str, Callable[[str], object]] = {FLAG: _TRUTH.get, NUMBER: float}
+    read = readers.get(dtype, int)
+    return pd.Series([read(cell) if cell else None for cell in cells], dtype=object)
 
 
 def is_of_a_search(trials: pd.DataFrame) -> bool:

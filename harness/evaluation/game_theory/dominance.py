@@ -24,10 +24,8 @@ def dominated(payoffs: FloatArray, names: Sequence[str]) -> list[str]:
     "0.60 naive + 0.40 robust". A linear program finds the mixture x: the largest margin m with
     x payoffs >= payoffs of the strategy + m in every column (e.g. Shoham and Leyton-Brown, "Multiagent Systems", 2009,
     section 4.5).
-    For failure rates, pass them with a minus sign. Raises ValueError for numbers that are not finite.
+    For failure rates, pass them with a minus sign.
     """
-    if payoffs.ndim != 2 or not payoffs.size or not np.isfinite(payoffs).all():
-        raise ValueError("dominance needs a complete table of finite numbers")
     return [_dominator(scaled(payoffs), strategy, names) for strategy in range(len(payoffs))]
 
 
@@ -57,10 +55,8 @@ def safest_mixture(failure_rates: FloatArray) -> FloatArray:
     ones, those with the least mean over the non-egos.
 
     Two linear programs: the least worst case v, then the least mean with at most v. If a pure ego is as safe as the
-    mixture, the result is the first such ego. Raises ValueError for rates that are missing or not from 0 to 1.
+    mixture, the result is the first such ego.
     """
-    if failure_rates.ndim != 2 or not failure_rates.size or not ((failure_rates >= 0) & (failure_rates <= 1)).all():
-        raise ValueError("the safest mixture needs a complete table of rates from 0 to 1")
     E, N = failure_rates.shape
     worst = failure_rates.max(axis=1)
     rates, ones = failure_rates.T, np.ones((N, 1))

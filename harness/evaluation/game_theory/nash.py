@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import scipy  # loads its parts at their first use: a worker that solves nothing does without
@@ -51,16 +51,15 @@ class NoEquilibrium(HarnessError):
     """No candidate verified. Every finite game has an equilibrium (Nash 1950): the numerical accuracy is too low."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Equilibrium:
+class Equilibrium(NamedTuple):
     """Shares of the ego's strategies [E] and of the non-ego's strategies [N]; each sums to 1."""
 
     ego_shares: FloatArray
     non_ego_shares: FloatArray
 
 
-def equilibrium_shares(ego_payoffs: FloatArray, non_ego_payoffs: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The shares [E] and [N] of one verified equilibrium of the game [E, N], always the same one.
+def equilibrium_shares(ego_payoffs: FloatArray, non_ego_payoffs: FloatArray) -> Equilibrium:
+    """One verified equilibrium of the game [E, N], always the same one.
 
     It is the equilibrium with the highest ego payoff. Among equal payoffs it is the first one when the ego's shares,
     then the non-ego's, are compared in the order of the strategies, larger shares first.
@@ -70,7 +69,7 @@ def equilibrium_shares(ego_payoffs: FloatArray, non_ego_payoffs: FloatArray) -> 
     equilibria = solve(ego_payoffs, non_ego_payoffs)
     if not equilibria:
         raise NoEquilibrium("no candidate equilibrium could be verified")
-    return equilibria[0].ego_shares, equilibria[0].non_ego_shares
+    return equilibria[0]
 
 
 def regrets(ego_payoffs: FloatArray, non_ego_payoffs: FloatArray, at: Equilibrium) -> tuple[float, float]:
@@ -108,9 +107,7 @@ def solve(ego_payoffs: FloatArray, non_ego_payoffs: FloatArray) -> list[Equilibr
 
     add_verified(_pure(reduced[0].shape))
     if few:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # "degenerate": the vertices are enumerated anyway
-            add_verified(_by_supports(*reduced))
+        add_verified(_by_supports(*reduced))
         add_verified(_by_vertices(*reduced))
     if not few or not found:
         add_verified(_by_integer_program(*reduced))
@@ -124,7 +121,7 @@ def scaled(payoffs: FloatArray) -> FloatArray:
 
 
 def _rounded(each: Equilibrium) -> FloatArray:
-    return np.concatenate([each.ego_shares, each.non_ego_shares]).round(_DIGITS) + 0.0
+    return np.concatenate(each).round(_DIGITS) + 0.0
 
 
 def _rank(each: Equilibrium, ego_payoffs: FloatArray) -> tuple[float, ...]:
@@ -168,7 +165,9 @@ def _pure(shape: tuple[int, ...]) -> Iterator[tuple[FloatArray, FloatArray]]:
 def _by_supports(ego_payoffs: FloatArray, non_ego_payoffs: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
     from nashpy.algorithms.support_enumeration import support_enumeration
 
-    yield from support_enumeration(ego_payoffs, non_ego_payoffs)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # "degenerate": the vertices are enumerated anyway
+        yield from list(support_enumeration(ego_payoffs, non_ego_payoffs))
 
 
 def _by_vertices(ego_payoffs: FloatArray, non_ego_payoffs: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
