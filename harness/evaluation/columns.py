@@ -29,12 +29,17 @@ _P_HOLM = Column(
 )
 _REASON = Column("reason", TEXT, "Why there is no verdict for want of competence; else empty.")
 _VERDICT = Column("verdict", TEXT, "What the row says about its question.")
-_FAILURE_RATE = Column("failure_rate", NUMBER, "Share of the games in which the ego failed.", unit=SHARE)
+_FAILED = "Share of the games in which the ego failed."
+_FAILURE_RATE = Column("failure_rate", NUMBER, _FAILED, unit=SHARE)
 
 
 def _outcome(role: str, who: str) -> Column:
     kinds = "`goal`, `collision` (with a road user), `rail` (with the edge of the drivable area), `timeout` or `error`"
     return Column(f"{role}_outcome", TEXT, f"How the {who}'s game ended: {kinds}; empty without one.")
+
+
+def _rate(name: str, meaning: str, interval: str = _EXACT) -> Iterator[Column]:
+    return Column(name, NUMBER, meaning, unit=SHARE).with_interval(interval)
 
 
 def _of_player(role: str, whose: str) -> Iterator[Column]:
@@ -53,7 +58,7 @@ def _means(whose: str) -> Iterator[Column]:
 def _summary() -> Iterator[Column]:
     yield from (ARM, PERSONA, SEED, _EPISODES)
     yield Column("errors", COUNT, "Games that could not be played.")
-    yield from _FAILURE_RATE.with_interval(_EXACT)
+    yield from _rate("failure_rate", _FAILED)
     for outcome in ("collision", "rail", "timeout"):
         yield Column(f"{outcome}s", MAYBE, f"Games in which the ego's outcome is {outcome}.")
     for each in _means("ego"):
@@ -61,203 +66,21 @@ def _summary() -> Iterator[Column]:
         if each.name == "mean_speed_mps":
             for end in ("low", "high"):
                 yield Column(f"mean_speed_{end}_mps", NUMBER, f"The {end} end of the {_T} of mean_speed_mps.")
-    rate = Column("non_ego_goal_rate", NUMBER, "Share of the people that reached their goals.", unit=SHARE)
-    yield from rate.with_interval(f"{_EXACT} (empty with several people)")
+    interval = f"{_EXACT} (empty with several people)"
+    yield from _rate("non_ego_goal_rate", "Share of the people that reached their goals.", interval)
     yield from _means("person")
-    yield from Column("near_miss_rate", NUMBER, "Share of the games with a near miss.", unit=SHARE).with_interval(
-        _EXACT
-    )
-
-
-_COMPARISONS = (
-    Column("question", TEXT, "RQ1: does the persona cause failures; RQ2: does retraining reduce them."),
-    *(PERSONA, SEED),
-    Column("metric", TEXT, "`failure` or `mean_speed`."),
-    *_PAIRS,
-    Column(
-        "mean_difference",
-        NUMBER,
-        "Of the pairs; above 0 supports H1.",
-        unit=OF_METRIC,
-        label="mean difference towards H1",
-    ),
-    Column("ci_low", NUMBER, f"The low end of its {_T}.", unit=OF_METRIC, label="its 95 % low"),
-    Column("ci_high", NUMBER, f"The high end of its {_T}.", unit=OF_METRIC, label="its 95 % high"),
-    Column("t", NUMBER, "The t statistic; empty where all differences are equal.", source=_PAPER),
-    *(_P, _P_HOLM),
-    Column("effect_size", NUMBER, "Cohen's d_z: mean over standard deviation.", label="effect size d_z"),
-    Column("mcnemar_p", NUMBER, "McNemar's exact test of failures.", unit=P_VALUE, label="McNemar p"),
-    Column("rejects_h0", FLAG, "Whether p_value is below the significance.", label="rejects H0 (p alone)"),
-    *(_VERDICT, _REASON),
-)
-
-_TRAINING = (
-    Column("stage", TEXT, "The name of the training."),
-    *(PERSONA, SEED),
-    Column("steps", COUNT, "Steps played so far."),
-    Column("mean_payoff", NUMBER, "Mean payoff of a game since the row before."),
-    _FAILURE_RATE,
-    Column("games", COUNT, "Games that ended since the row before."),
-    Column("mean_duration_s", NUMBER, "Their mean duration."),
-    Column("stopped", TEXT, "In the last row of a training: `converged`, `budget` or `did not learn`."),
-)
-
-_RECONFIGURATION = (
-    Column("stage", TEXT, "The name of the search."),
-    *(PERSONA, SEED),
-    Column("trial", COUNT, "The trial; 0 is the ego as given."),
-    Column("parameter", TEXT, "A parameter of the ego."),
-    Column("value", NUMBER, "Its value in the trial."),
-    Column("low", NUMBER, "The lower bound of the search."),
-    Column("high", NUMBER, "The upper bound of the search."),
-    Column("mean_payoff", NUMBER, "Mean payoff of the trial's games."),
-    _FAILURE_RATE,
-    Column("best_payoff", NUMBER, "The best mean payoff so far."),
-    Column("chosen", FLAG, "Whether this trial was taken."),
-    Column("error", TEXT, "Why the trial could not be played; else empty."),
-)
-
-_MANOEUVRES = (
-    *_GAME,
-    Column("player", TEXT, "Who performs it."),
-    Column("manoeuvre", TEXT, "Its name in docs/manoeuvres.md."),
-    Column("time_s", NUMBER, "When it begins."),
-    Column("until_s", NUMBER, "When it ends."),
-    Column("gap_m", NUMBER, "Gap to the leader; of a body that enters a lane, to the follower."),
-    Column("ttc_s", NUMBER, "Time to collision, of the same two."),
-    Column("text", TEXT, "What it was, in words."),
-)
-
-_CAUSES = (
-    *_GAME,
-    _outcome("ego", "ego"),
-    Column("other", TEXT, "The road user that was involved; empty if none was."),
-    Column("event", TEXT, "What led to the failure, by its name in docs/manoeuvres.md."),
-    Column("deed", TEXT, "The same in words."),
-    Column("time_s", NUMBER, "When that began."),
-    Column("time_left_s", NUMBER, "From then to the end of the ego's game: what the ego had."),
-    Column("ego_saw", TEXT, "`yes` or `no`; empty if no other was involved."),
-    Column("hidden_until_s", NUMBER, "Time before the end at which the other came into sight, if something hid it."),
-    Column("reaction", TEXT, "`brakes`, `swerves`, `brakes and swerves` or `no reaction`."),
-    Column("braking_mps2", NUMBER, "Strongest braking of the ego in that time."),
-    Column("ego_broke", TEXT, "A rule of the road that the ego broke; empty if none."),
-)
-
-_POPULATIONS = (
-    ARM,
-    Column("population", TEXT, "The population that drove against the ego."),
-    *(SEED, PERSONA, _EPISODES),
-    Column("errors", COUNT, "Games that could not be played."),
-    *_FAILURE_RATE.with_interval(_EXACT),
-    *(each for each in _means("ego") if each.name in ("mean_speed_mps", "ego_payoff")),
-    *(each for each in _means("person") if each.name == "non_ego_payoff"),
-)
+    yield from _rate("near_miss_rate", "Share of the games with a near miss.")
 
 
 _STRATEGIES = (Column("ego", TEXT, "The strategy of the ego."), Column("non_ego", TEXT, "That of the non-ego."))
-
-_GAPS = (
-    *(SEED, PERSONA),
-    Column("round", COUNT, "The round of the iterated best response."),
-    Column("role", TEXT, "The player replaced by a best response: `ego` or `non_ego`."),
-    *_STRATEGIES,
-    *_PAIRS,
-    Column("payoff", NUMBER, "Mean payoff of the player of that role, over the pairs."),
-    Column("payoff_best_response", NUMBER, "That of its best response."),
-    Column("gap", NUMBER, "Mean of best response minus player; below 0: the training found nothing better."),
-    Column("ci_low", NUMBER, f"The low end of its {_T}.", label="its 95 % low"),
-    Column("ci_high", NUMBER, f"The high end of its {_T}.", label="its 95 % high"),
-    Column("gap_share", NUMBER, "gap / |payoff|; empty where the payoff is 0.", unit=SHARE),
-    *(_P, _P_HOLM),
-    *Column("ego_failure_rate", NUMBER, "Of the ego in the pair.", unit=SHARE).with_interval(_EXACT),
-    *Column(
-        "ego_failure_rate_best_response", NUMBER, "The same with the best response in its place.", unit=SHARE
-    ).with_interval(_EXACT),
-    *Column(
-        "failure_difference", NUMBER, "Mean of ego failures with the best response minus without.", unit=POINTS
-    ).with_interval(_T),
-    *(_VERDICT, _REASON),
-)
-
-_CROSSPLAY = (
-    SEED,
-    *_STRATEGIES,
-    *(PERSONA, ARM),
-    Column("games", COUNT, "Games that were played and measured."),
-    Column("left_out", COUNT, "Episodes of this seed that were not played, not measured, or are missing."),
-    *_FAILURE_RATE.with_interval(_EXACT),
-    *Column("ego_payoff", NUMBER, "Mean payoff of the ego.").with_interval(_T),
-    *Column("non_ego_payoff", NUMBER, "Mean payoff of the non-ego.").with_interval(_T),
-    Column("ego_mean_speed_mps", NUMBER, "Mean over the games of the ego's mean speed."),
-)
-
-_EQUILIBRIA = (
-    SEED,
-    Column("game", TEXT, "The persona of the non-egos, or `all`: every non-ego, of any persona or none."),
-    Column("solution", TEXT, "`nash`, `safest` (game `all` only), or why there is none."),
-    Column("number", MAYBE, "Of the equilibrium within seed and game, from 1, the one to choose first."),
-    Column("role", TEXT, "`ego` or `non_ego`."),
-    Column("player", TEXT, "The strategy."),
-    Column("share", NUMBER, "How often its role plays it; empty for the non-egos of `safest`.", unit=SHARE),
-    Column("payoff", NUMBER, "Of this strategy against the other side's shares (nash)."),
-    Column("solution_payoff", NUMBER, "Of its role in this solution (nash)."),
-    Column("regret", NUMBER, "The possible gain of its role by another strategy of the table (nash)."),
-    Column("failure_rate", NUMBER, "Of the ego against the other side's shares; safest: its worst case.", unit=SHARE),
-    Column("solution_failure_rate", NUMBER, "Of the ego in this solution; safest: the mixture's worst.", unit=SHARE),
-    Column("dominated_in_payoff", TEXT, "The strategy or mixture of its role that strictly dominates it; empty: none."),
-    Column("dominated_in_failures", TEXT, "The same for an ego's failure rates."),
-)
-
-_GENERALISATION = (
-    SEED,
-    Column("ego", TEXT, "The retrained ego."),
-    Column("met", TEXT, "The personas it was trained against, joined by ` + `."),
-    Column("persona", TEXT, "Of the non-ego: one it was not trained against."),
-    Column("non_ego", TEXT, "The non-ego."),
-    *_PAIRS,
-    *_FAILURE_RATE.with_interval(_EXACT),
-    Column("naive_failure_rate", NUMBER, "Of the naive ego against the same non-ego, same episodes.", unit=SHARE),
-    Column("share_of_naive", NUMBER, "failure_rate / naive_failure_rate; empty where the naive ego never fails."),
-    *Column(
-        "fewer_failures", NUMBER, "Mean of naive minus this ego; above 0 it fails less.", unit=POINTS
-    ).with_interval(_T),
-    *(_P, _P_HOLM, _VERDICT, _REASON),
-)
-
-_REFERENCE_DRIVERS = (
-    *_GAME,
-    Column("driver", TEXT, "The reference driver."),
-    _outcome("ego", "ego"),
-    Column("failed_s", NUMBER, "When the ego failed."),
-    Column("conflict_s", NUMBER, "The first moment at which the driver's rule says danger; empty: never."),
-    Column("prevented_from_conflict", MAYBE, "1: it prevents the collision from then on, 0: not, empty: no verdict."),
-    Column("prevented_from_start", MAYBE, "1: driving from the start it reaches the goal, 0: not."),
-    Column(
-        "outcome_from_start",
-        TEXT,
-        "How the game ends with this driver from the start; `on_red` or `wrong_way` for a goal that breaks this rule.",
-    ),
-    Column("preventable_from_s", NUMBER, "First moment from which full braking prevents the collision."),
-    Column("preventable_until_s", NUMBER, "Last moment from which full braking prevents the collision."),
-    Column("error", TEXT, "Why the game could not be played from the start; else empty."),
-)
 
 
 def _prevented(verdict: str) -> Iterator[Column]:
     yield Column(f"{verdict}_judged", COUNT, "Failures with a verdict.")
     yield Column(f"{verdict}_prevented", COUNT, "Of these, prevented.")
-    yield from Column(f"{verdict}_share", NUMBER, "prevented / judged.", unit=SHARE).with_interval(_EXACT)
-    yield from Column(f"{verdict}_rate", NUMBER, "prevented / episodes.", unit=SHARE).with_interval(_EXACT)
+    yield from _rate(f"{verdict}_share", "prevented / judged.")
+    yield from _rate(f"{verdict}_rate", "prevented / episodes.")
 
-
-_PREVENTABILITY = (
-    *(ARM, PERSONA, SEED),
-    Column("driver", TEXT, "The reference driver; `any`: any of them but the upper bound."),
-    Column("episodes", COUNT, "Games that were played.", label="games"),
-    Column("failures", COUNT, "Failures of the ego."),
-    *_prevented("from_conflict"),
-    *_prevented("from_start"),
-)
 
 _TABLES = {
     "episodes": (
@@ -268,19 +91,182 @@ _TABLES = {
         _ERROR,
     ),
     "played": (*_GAME, _outcome("ego", "ego"), _outcome("non_ego", "person"), _ERROR),
-    "causes": _CAUSES,
-    "manoeuvres": _MANOEUVRES,
+    "causes": (
+        *_GAME,
+        _outcome("ego", "ego"),
+        Column("other", TEXT, "The road user that was involved; empty if none was."),
+        Column("event", TEXT, "What led to the failure, by its name in docs/manoeuvres.md."),
+        Column("deed", TEXT, "The same in words."),
+        Column("time_s", NUMBER, "When that began."),
+        Column("time_left_s", NUMBER, "From then to the end of the ego's game: what the ego had."),
+        Column("ego_saw", TEXT, "`yes` or `no`; empty if no other was involved."),
+        Column(
+            "hidden_until_s", NUMBER, "Time before the end at which the other came into sight, if something hid it."
+        ),
+        Column("reaction", TEXT, "`brakes`, `swerves`, `brakes and swerves` or `no reaction`."),
+        Column("braking_mps2", NUMBER, "Strongest braking of the ego in that time."),
+        Column("ego_broke", TEXT, "A rule of the road that the ego broke; empty if none."),
+    ),
+    "manoeuvres": (
+        *_GAME,
+        Column("player", TEXT, "Who performs it."),
+        Column("manoeuvre", TEXT, "Its name in docs/manoeuvres.md."),
+        Column("time_s", NUMBER, "When it begins."),
+        Column("until_s", NUMBER, "When it ends."),
+        Column("gap_m", NUMBER, "Gap to the leader; of a body that enters a lane, to the follower."),
+        Column("ttc_s", NUMBER, "Time to collision, of the same two."),
+        Column("text", TEXT, "What it was, in words."),
+    ),
     "summary": tuple(_summary()),
-    "comparisons": _COMPARISONS,
-    "training": _TRAINING,
-    "populations": _POPULATIONS,
-    "reconfiguration": _RECONFIGURATION,
-    "gaps": _GAPS,
-    "crossplay": _CROSSPLAY,
-    "equilibria": _EQUILIBRIA,
-    "generalisation": _GENERALISATION,
-    "reference_drivers": _REFERENCE_DRIVERS,
-    "preventability": _PREVENTABILITY,
+    "comparisons": (
+        Column("question", TEXT, "RQ1: does the persona cause failures; RQ2: does retraining reduce them."),
+        *(PERSONA, SEED),
+        Column("metric", TEXT, "`failure` or `mean_speed`."),
+        *_PAIRS,
+        Column(
+            "mean_difference",
+            NUMBER,
+            "Of the pairs; above 0 supports H1.",
+            unit=OF_METRIC,
+            label="mean difference towards H1",
+        ),
+        Column("ci_low", NUMBER, f"The low end of its {_T}.", unit=OF_METRIC, label="its 95 % low"),
+        Column("ci_high", NUMBER, f"The high end of its {_T}.", unit=OF_METRIC, label="its 95 % high"),
+        Column("t", NUMBER, "The t statistic; empty where all differences are equal.", source=_PAPER),
+        *(_P, _P_HOLM),
+        Column("effect_size", NUMBER, "Cohen's d_z: mean over standard deviation.", label="effect size d_z"),
+        Column("mcnemar_p", NUMBER, "McNemar's exact test of failures.", unit=P_VALUE, label="McNemar p"),
+        Column("rejects_h0", FLAG, "Whether p_value is below the significance.", label="rejects H0 (p alone)"),
+        *(_VERDICT, _REASON),
+    ),
+    "training": (
+        Column("stage", TEXT, "The name of the training."),
+        *(PERSONA, SEED),
+        Column("steps", COUNT, "Steps played so far."),
+        Column("mean_payoff", NUMBER, "Mean payoff of a game since the row before."),
+        _FAILURE_RATE,
+        Column("games", COUNT, "Games that ended since the row before."),
+        Column("mean_duration_s", NUMBER, "Their mean duration."),
+        Column("stopped", TEXT, "In the last row of a training: `converged`, `budget` or `did not learn`."),
+    ),
+    "populations": (
+        ARM,
+        Column("population", TEXT, "The population that drove against the ego."),
+        *(SEED, PERSONA, _EPISODES),
+        Column("errors", COUNT, "Games that could not be played."),
+        *_rate("failure_rate", _FAILED),
+        *(each for each in _means("ego") if each.name in ("mean_speed_mps", "ego_payoff")),
+        *(each for each in _means("person") if each.name == "non_ego_payoff"),
+    ),
+    "reconfiguration": (
+        Column("stage", TEXT, "The name of the search."),
+        *(PERSONA, SEED),
+        Column("trial", COUNT, "The trial; 0 is the ego as given."),
+        Column("parameter", TEXT, "A parameter of the ego."),
+        Column("value", NUMBER, "Its value in the trial."),
+        Column("low", NUMBER, "The lower bound of the search."),
+        Column("high", NUMBER, "The upper bound of the search."),
+        Column("mean_payoff", NUMBER, "Mean payoff of the trial's games."),
+        _FAILURE_RATE,
+        Column("best_payoff", NUMBER, "The best mean payoff so far."),
+        Column("chosen", FLAG, "Whether this trial was taken."),
+        Column("error", TEXT, "Why the trial could not be played; else empty."),
+    ),
+    "gaps": (
+        *(SEED, PERSONA),
+        Column("round", COUNT, "The round of the iterated best response."),
+        Column("role", TEXT, "The player replaced by a best response: `ego` or `non_ego`."),
+        *_STRATEGIES,
+        *_PAIRS,
+        Column("payoff", NUMBER, "Mean payoff of the player of that role, over the pairs."),
+        Column("payoff_best_response", NUMBER, "That of its best response."),
+        Column("gap", NUMBER, "Mean of best response minus player; below 0: the training found nothing better."),
+        Column("ci_low", NUMBER, f"The low end of its {_T}.", label="its 95 % low"),
+        Column("ci_high", NUMBER, f"The high end of its {_T}.", label="its 95 % high"),
+        Column("gap_share", NUMBER, "gap / |payoff|; empty where the payoff is 0.", unit=SHARE),
+        *(_P, _P_HOLM),
+        *_rate("ego_failure_rate", "Of the ego in the pair."),
+        *_rate("ego_failure_rate_best_response", "The same with the best response in its place."),
+        *Column(
+            "failure_difference", NUMBER, "Mean of ego failures with the best response minus without.", unit=POINTS
+        ).with_interval(_T),
+        *(_VERDICT, _REASON),
+    ),
+    "crossplay": (
+        SEED,
+        *_STRATEGIES,
+        *(PERSONA, ARM),
+        Column("games", COUNT, "Games that were played and measured."),
+        Column("left_out", COUNT, "Episodes of this seed that were not played, not measured, or are missing."),
+        *_rate("failure_rate", _FAILED),
+        *Column("ego_payoff", NUMBER, "Mean payoff of the ego.").with_interval(_T),
+        *Column("non_ego_payoff", NUMBER, "Mean payoff of the non-ego.").with_interval(_T),
+        Column("ego_mean_speed_mps", NUMBER, "Mean over the games of the ego's mean speed."),
+    ),
+    "equilibria": (
+        SEED,
+        Column("game", TEXT, "The persona of the non-egos, or `all`: every non-ego, of any persona or none."),
+        Column("solution", TEXT, "`nash`, `safest` (game `all` only), or why there is none."),
+        Column("number", MAYBE, "Of the equilibrium within seed and game, from 1, the one to choose first."),
+        Column("role", TEXT, "`ego` or `non_ego`."),
+        Column("player", TEXT, "The strategy."),
+        Column("share", NUMBER, "How often its role plays it; empty for the non-egos of `safest`.", unit=SHARE),
+        Column("payoff", NUMBER, "Of this strategy against the other side's shares (nash)."),
+        Column("solution_payoff", NUMBER, "Of its role in this solution (nash)."),
+        Column("regret", NUMBER, "The possible gain of its role by another strategy of the table (nash)."),
+        Column(
+            "failure_rate", NUMBER, "Of the ego against the other side's shares; safest: its worst case.", unit=SHARE
+        ),
+        Column(
+            "solution_failure_rate", NUMBER, "Of the ego in this solution; safest: the mixture's worst.", unit=SHARE
+        ),
+        Column(
+            "dominated_in_payoff", TEXT, "The strategy or mixture of its role that strictly dominates it; empty: none."
+        ),
+        Column("dominated_in_failures", TEXT, "The same for an ego's failure rates."),
+    ),
+    "generalisation": (
+        SEED,
+        Column("ego", TEXT, "The retrained ego."),
+        Column("met", TEXT, "The personas it was trained against, joined by ` + `."),
+        Column("persona", TEXT, "Of the non-ego: one it was not trained against."),
+        Column("non_ego", TEXT, "The non-ego."),
+        *_PAIRS,
+        *_rate("failure_rate", _FAILED),
+        Column("naive_failure_rate", NUMBER, "Of the naive ego against the same non-ego, same episodes.", unit=SHARE),
+        Column("share_of_naive", NUMBER, "failure_rate / naive_failure_rate; empty where the naive ego never fails."),
+        *Column(
+            "fewer_failures", NUMBER, "Mean of naive minus this ego; above 0 it fails less.", unit=POINTS
+        ).with_interval(_T),
+        *(_P, _P_HOLM, _VERDICT, _REASON),
+    ),
+    "reference_drivers": (
+        *_GAME,
+        Column("driver", TEXT, "The reference driver."),
+        _outcome("ego", "ego"),
+        Column("failed_s", NUMBER, "When the ego failed."),
+        Column("conflict_s", NUMBER, "The first moment at which the driver's rule says danger; empty: never."),
+        Column(
+            "prevented_from_conflict", MAYBE, "1: it prevents the collision from then on, 0: not, empty: no verdict."
+        ),
+        Column("prevented_from_start", MAYBE, "1: driving from the start it reaches the goal, 0: not."),
+        Column(
+            "outcome_from_start",
+            TEXT,
+            "How the game ends with this driver from the start; `on_red`, `wrong_way`: a goal that breaks this rule.",
+        ),
+        Column("preventable_from_s", NUMBER, "First moment from which full braking prevents the collision."),
+        Column("preventable_until_s", NUMBER, "Last moment from which full braking prevents the collision."),
+        Column("error", TEXT, "Why the game could not be played from the start; else empty."),
+    ),
+    "preventability": (
+        *(ARM, PERSONA, SEED),
+        Column("driver", TEXT, "The reference driver; `any`: any of them but the upper bound."),
+        Column("episodes", COUNT, "Games that were played.", label="games"),
+        Column("failures", COUNT, "Failures of the ego."),
+        *_prevented("from_conflict"),
+        *_prevented("from_start"),
+    ),
 }
 TABLES: Mapping[str, Mapping[str, Column]] = {
     table: {column.name: column for column in columns} for table, columns in _TABLES.items()

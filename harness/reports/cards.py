@@ -146,7 +146,8 @@ def _facts(persona: str, is_changed: bool, tables: RunTables) -> list[tuple[str,
     }
     if causes:
         facts.append((f"How the {tables.naive} fails against {persona}", _by_seed(causes)))
-    prevented = {each.seed: " ".join(each.sentences) for each in tables.prevented_in(arm) if each.failures}
+    judged = [each for each in tables.prevented_in(arm) if each.row["failures"]]
+    prevented = {each.row["seed"]: " ".join(each.sentences) for each in judged}
     if prevented:
         facts.append(("Could it have been prevented?", _by_seed(prevented)))
     facts.append(("An ordinary SUMO driver in the persona's place", _ordinary_driver(persona, tables)))

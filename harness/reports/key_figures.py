@@ -55,11 +55,12 @@ def _causes(persona: str, tables: RunTables) -> Iterator[KeyFigure]:
 def _preventable(persona: str, tables: RunTables) -> Iterator[KeyFigure]:
     lines = []
     naive, _ = tables.arms_of("RQ2", persona)
-    for each in tables.prevented_in(naive):
-        if each.failures:
-            count = f"{each.prevented} of {each.judged} failures of the {tables.naive}"
-            rate = f"{percent(each.rate)} of its games, {sure(each.rate_low, each.rate_high)}"
-            lines.append(f"{_seed(each.seed, tables)}{count} by a reference driver in its seat ({rate})")
+    for row, _ in tables.prevented_in(naive):
+        if row["failures"]:
+            count = f"{row['from_start_prevented']} of {row['from_start_judged']} failures of the {tables.naive}"
+            share = sure(row["from_start_rate_low"], row["from_start_rate_high"])
+            rate = f"{percent(row['from_start_rate'])} of its games, {share}"
+            lines.append(f"{_seed(row['seed'], tables)}{count} by a reference driver in its seat ({rate})")
     yield KeyFigure(title="Preventable", lines=lines)
 
 

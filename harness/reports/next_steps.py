@@ -141,7 +141,10 @@ def _prevented(tables: RunTables) -> list[str]:
     all_avoided, all_failures = 0, 0
     for persona, arm in arms.items():
         judged = tables.prevented_in(arm)
-        avoided, failed = sum(each.prevented for each in judged), sum(each.judged for each in judged)
+        avoided, failed = (
+            sum(each.row["from_start_prevented"] for each in judged),
+            sum(each.row["from_start_judged"] for each in judged),
+        )
         if failed and lines:
             lines.append(f"Against {persona}: {avoided} of {failed}.")
         elif failed:

@@ -16,8 +16,8 @@ and a game may fail to be played.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
 
 import pandas as pd
 
@@ -30,20 +30,11 @@ UPPER_BOUND = "upper_bound"
 _VERDICTS = ("from_conflict", "from_start")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Preventability:
+class Preventability(NamedTuple):
     """What the failures of one arm and training seed come to."""
 
-    seed: int
-    failures: int
-    judged: int
-    """Failures on which there is a verdict from the start."""
-    prevented: int
-    """Of these, prevented by at least one reference driver but the upper bound."""
-    rate: float
-    """Preventable failure rate: `prevented` per game, with its 95 % interval."""
-    rate_low: float
-    rate_high: float
+    row: Mapping[Any, Any]
+    """The row of `ANY` in preventability.csv."""
     sentences: list[str]
     """The verdicts in words, one sentence each; empty without failures."""
 
@@ -86,21 +77,10 @@ def preventability_of(counts: pd.DataFrame, games: pd.DataFrame, arm: str) -> li
     found = []
     for seed, rows in counts[counts["arm"] == arm].groupby("seed", sort=False):
         drivers = rows.set_index("driver")
-        both = drivers.loc[ANY]
         of_arm = games[(games["arm"] == arm) & (games["seed"] == seed)]
         last_chance_s = (of_arm["failed_s"] - of_arm["preventable_until_s"]).median()
-        found.append(
-            Preventability(
-                seed=int(seed),
-                failures=int(both["failures"]),
-                judged=int(both["from_start_judged"]),
-                prevented=int(both["from_start_prevented"]),
-                rate=float(both["from_start_rate"]),
-                rate_low=float(both["from_start_rate_low"]),
-                rate_high=float(both["from_start_rate_high"]),
-                sentences=list(_sentences(drivers, last_chance_s)) if both["failures"] else [],
-            )
-        )
+        row = drivers.loc[ANY].to_dict()
+        found.append(Preventability(row, list(_sentences(drivers, last_chance_s)) if row["failures"] else []))
     return found
 
 

@@ -82,5 +82,5 @@ def test_sentences__say_both_verdicts_apart(counts: dict[str, dict[str, Any]]) -
         "in the first moment of danger 2).",
         "Full braking prevents the collision until 0.8 s before it (median).",
     ]
-    assert found.rate == pytest.approx(0.2)
+    assert found.row["from_start_rate"] == pytest.approx(0.2)
     assert not preventability_of(table, GAMES, "retrained_vs_speedy")
