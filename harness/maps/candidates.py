@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from enum import Enum
-from itertools import combinations
+from itertools import chain
 
 import numpy as np
 import shapely
@@ -20,9 +20,9 @@ from sumolib.net.lane import Lane
 from sumolib.net.node import Node
 
 from harness.game.arrays import FloatArray
-from harness.maps.net_conflicts import Priority
+from harness.maps.net_conflicts import Priority, foe_pairs, in_order, place_of
 from harness.road.net.network import car_lanes, lane_line
-from harness.road.net.right_of_way_table import foes_of, overlap_of, yields_to
+from harness.road.net.right_of_way_table import overlap_of
 from harness.road.net.route_table import line_over_junction
 from harness.road.net.stream import TURNAROUNDS, Feeders, Stream
 
@@ -51,6 +51,11 @@ class LaneWay:
     start: Lane
     end: Lane
 
+    @classmethod
+    def of(cls, link: Connection) -> LaneWay:
+        """The way of a connection."""
+        return cls(start=link.getFromLane(), end=link.getToLane())
+
     @property
     def edges(self) -> tuple[str, str]:
         """The edges before and behind the junction."""
@@ -65,9 +70,9 @@ class Candidate:
     junction: str
     first: LaneWay
     second: LaneWay | None  # None at a zebra crossing: the second is on foot
-    priority: Priority
-    with_signals: bool
     place: FloatArray  # [2]
+    priority: Priority = Priority.NONE
+    with_signals: bool = False
     footway: FloatArray | None = None  # [2, 2] middle line of a zebra crossing
 
     @property
@@ -80,16 +85,16 @@ class Candidate:
 def candidates(net: Net) -> list[Candidate]:
     """The places where two ways meet on a net, in the order of their numbers."""
     feeders, rings = Feeders(net), {name for each in net.getRoundabouts() for name in each.getEdges()}
+    nodes = sorted(net.getNodes(), key=lambda node: str(node.getID()))
+    crossings = [edge for edge in net.getEdges(withInternal=True) if edge.getFunction() == "crossing"]
+    everything = chain(
+        chain.from_iterable(_at_junction(node, feeders, rings) for node in nodes),
+        chain.from_iterable(_zebra(net, crossing) for crossing in crossings),
+        chain.from_iterable(_lane_ends(edge) for edge in net.getEdges(withInternal=False)),
+    )
     found: dict[tuple[object, ...], Candidate] = {}
-    for node in sorted(net.getNodes(), key=lambda node: str(node.getID())):
-        for each in _at_junction(node, feeders, rings):
-            found.setdefault(each.order, each)
-    for crossing in (edge for edge in net.getEdges(withInternal=True) if edge.getFunction() == "crossing"):
-        for each in _zebra(net, crossing):
-            found.setdefault(each.order, each)
-    for edge in net.getEdges(withInternal=False):
-        for each in _lane_ends(edge):
-            found.setdefault(each.order, each)
+    for each in everything:
+        found.setdefault(each.order, each)
     return sorted(found.values(), key=lambda each: each.order)
 
 
@@ -111,21 +116,27 @@ def _at_junction(node: Node, feeders: Feeders, rings: set[str]) -> Iterator[Cand
     if len(links) < 2:
         return
     arms = len({link.getFrom() for link in links})
-    foes = {link: set(foes_of(link)) for link in links}
     streams = {link: Stream(link, feeders) for link in links}
     seen: set[tuple[object, ...]] = set()
-    for one, other in combinations(links, 2):
+    for one, other in foe_pairs(links):
         key = (one.getFrom(), one.getTo(), other.getFrom(), other.getTo(), one.getToLane() is other.getToLane())
-        if key in seen or one not in foes[other] or other not in foes[one]:
-            continue
-        kind = _kind(one, other, rings, arms)
+        kind = _kind(one, other, rings, arms) if key not in seen else None
         overlap = overlap_of(streams[one], streams[other]) if kind is not None else None
         if kind is None or overlap is None:
             continue
         seen.add(key)
-        middle = np.array(overlap.centroid.coords[0])
-        place = lane_line(one.getToLane())[0] if one.getToLane() is other.getToLane() else middle
-        yield _candidate(node, kind, one=one, other=other, place=place)
+        first, second, priority = in_order(one, other)
+        if priority is not Priority.FIRST and float(_out(one) @ _into(one)) < float(_out(other) @ _into(other)):
+            first, second = other, one  # of equal ones, the straighter way is the ego's
+        yield Candidate(
+            kind=kind,
+            junction=node.getID(),
+            first=LaneWay.of(first),
+            second=LaneWay.of(second),
+            place=place_of(one, other, overlap),
+            priority=priority,
+            with_signals=bool(one.getTLSID() or other.getTLSID()),
+        )
 
 
 def _kind(one: Connection, other: Connection, rings: set[str], arms: int) -> CandidateKind | None:
@@ -146,27 +157,6 @@ def _kind(one: Connection, other: Connection, rings: set[str], arms: int) -> Can
     return CandidateKind.TURN_ACROSS if opposite and any(turns) else CandidateKind.CROSSING
 
 
-def _candidate(node: Node, kind: CandidateKind, *, one: Connection, other: Connection, place: FloatArray) -> Candidate:
-    one_yields, first_come = yields_to(one, other)
-    other_yields, _ = yields_to(other, one)
-    signals = bool(one.getTLSID() or other.getTLSID())
-    has_priority = (one_yields or other_yields) and not first_come
-    turning = float(_out(one) @ _into(one)) < float(_out(other) @ _into(other))
-    swapped = one_yields if has_priority else turning  # of equal ones, the straighter way is the ego's
-    first, second = (other, one) if swapped else (one, other)
-    rule = Priority.FIRST if has_priority else Priority.FIRST_TO_ARRIVE if first_come else Priority.NONE
-    ways = [LaneWay(start=link.getFromLane(), end=link.getToLane()) for link in (first, second)]
-    return Candidate(
-        kind=kind,
-        junction=node.getID(),
-        first=ways[0],
-        second=ways[1],
-        priority=rule,
-        with_signals=signals,
-        place=place,
-    )
-
-
 def _lane_ends(edge: Edge) -> Iterator[Candidate]:
     """Lanes that end at the end of an edge beside one that goes on."""
     lanes = car_lanes(edge)
@@ -176,14 +166,12 @@ def _lane_ends(edge: Edge) -> Iterator[Candidate]:
         if onward[lane] or not beside:
             continue
         through = onward[beside[-1]][0]
-        first = LaneWay(start=through.getFromLane(), end=through.getToLane())
         yield Candidate(
             kind=CandidateKind.LANE_END,
             junction=edge.getToNode().getID(),
-            first=first,
+            first=LaneWay.of(through),
             second=LaneWay(start=lane, end=through.getToLane()),
             priority=Priority.FIRST,
-            with_signals=False,
             place=lane_line(lane)[-1],
         )
 
@@ -200,10 +188,8 @@ def _zebra(net: Net, crossing: Edge) -> Iterator[Candidate]:
             yield Candidate(
                 kind=CandidateKind.ZEBRA,
                 junction=node.getID(),
-                first=LaneWay(start=link.getFromLane(), end=link.getToLane()),
+                first=LaneWay.of(link),
                 second=None,
-                priority=Priority.NONE,
-                with_signals=False,
                 place=line.mean(axis=0),
                 footway=np.stack((line[0], line[-1])),
             )
@@ -229,8 +215,6 @@ def following(net: Net) -> Iterator[Candidate]:
             junction=edge.getToNode().getID(),
             first=way,
             second=way,
-            priority=Priority.NONE,
-            with_signals=False,
             place=line.mean(axis=0),
         )
 

@@ -14,7 +14,7 @@ from harness.game.arrays import FloatArray
 from harness.game.road import SPACING_M
 from harness.maps.candidates import Candidate, CandidateKind, LaneWay, candidates, following
 from harness.maps.footways import way_over
-from harness.maps.planned_routes import PlannedRoute, following_m, meeting_near, planned_route
+from harness.maps.planned_routes import PlannedRoute, following_m, meeting_near, planned_route, sampled_to
 from harness.road.net.meeting import meeting_of_lines
 
 Range = tuple[float, float]
@@ -196,9 +196,8 @@ class Plans:
             way = way_over(candidate, _WALK_MPS[1] * most_s + 2.0)
             if way is None:
                 return "no pavement on a side of it"
-            walked = shapely.segmentize(shapely.LineString(way), SPACING_M)
-            line = _every(walked)
-            found = meeting_of_lines(ego_route.line, line)
+            walked = shapely.LineString(way)
+            found = meeting_of_lines(ego_route.line, sampled_to(walked, walked.length))
             if found is None:
                 continue
             start = _ego_start(found.ego_m, speed, seconds)
@@ -276,11 +275,6 @@ def _narrow(ways: list[LaneWay]) -> str:
         if lane.getWidth() < _NARROWEST_M:
             return f"lanes narrower than {_NARROWEST_M:g} m{_EXAMPLE}{lane.getID()} of {lane.getWidth():.2f} m"
     return ""
-
-
-def _every(line: shapely.LineString) -> FloatArray:
-    stations = np.arange(0.0, line.length + 1e-6, SPACING_M)
-    return np.asarray(shapely.get_coordinates(shapely.line_interpolate_point(line, stations)))
 
 
 def _rounded(low: float, high: float) -> Range:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import errno
-import gzip
 import re
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -86,8 +84,7 @@ def _copied(path: Path, folder: Path, left_hand: bool) -> tuple[Path, Net]:
 
 def _convert(path: Path, kind: MapKind, *, facts: MapFacts, net_file: Path, left_hand: bool) -> None:
     source = net_file.with_name("map.xml")  # netconvert splits names at commas and blanks
-    with path.open("rb") as packed, source.open("wb") as plain:
-        shutil.copyfileobj(gzip.GzipFile(fileobj=packed) if path.suffix.lower() == ".gz" else packed, plain)
+    source.write_bytes(xml_bytes(path, MOST_BYTES))
     options = ["--xml-validation", "never", "--output-file", net_file.name, "--aggregate-warnings", "1", *_LIGHTS]
     if kind is MapKind.OSM:
         types = Path(sumo.SUMO_HOME) / "data" / "typemap"
@@ -126,7 +123,8 @@ def _is_left(path: Path, facts: MapFacts, left_hand: bool) -> bool:
 
 def _check_rotation(path: Path, net: Net, left_hand: bool) -> None:
     """Raise UsageError if traffic in most roundabouts runs the other way round than on the stated side of the road."""
-    turns = [turn for turn in map(_turn, _rings(net)) if turn]
+    rings = [[net.getEdge(name) for name in each.getEdges()] for each in net.getRoundabouts()]
+    turns = [turn for turn in map(_turn, rings) if turn]
     if turns and (np.mean(turns) > 0.0) == left_hand and np.mean(turns):
         sense, side = ("counter-clockwise", "right") if left_hand else ("clockwise", "left")
         remedy = "leave out --left-hand" if left_hand else "give --left-hand"
@@ -134,17 +132,9 @@ def _check_rotation(path: Path, net: Net, left_hand: bool) -> None:
         raise UsageError.of(path, "junction=roundabout", message, remedy)
 
 
-def _rings(net: Net) -> list[list[Edge]]:
-    return [[net.getEdge(name) for name in each.getEdges()] for each in net.getRoundabouts()]
-
-
 def _turn(ring: list[Edge]) -> float:
     """1 for a counter-clockwise ring, -1 for a clockwise one, 0 without a turn."""
-    points = np.concatenate([lane_line(edge.getLane(0)) for edge in ring])
-    centre = points.mean(axis=0)
-    turned = [_cross(line[0] - centre, line[-1] - centre) for line in (lane_line(edge.getLane(0)) for edge in ring)]
-    return float(np.sign(sum(turned)))
-
-
-def _cross(first: np.ndarray, second: np.ndarray) -> float:
-    return float(first[0] * second[1] - first[1] * second[0])
+    lines = [lane_line(edge.getLane(0)) for edge in ring]
+    centre = np.concatenate(lines).mean(axis=0)
+    first, last = (np.array([line[k] for line in lines]) - centre for k in (0, -1))
+    return float(np.sign((first[:, 0] * last[:, 1] - first[:, 1] * last[:, 0]).sum()))

@@ -1,26 +1,25 @@
 """A map file: its kind, and what is checked before SUMO's netconvert reads it.
 
-The file is read once in parts, so that one that is too large, has no roads or names other files is refused before it is
-converted.
+A file that is too large, has no roads or names other files is refused before it is converted.
 """
 
 from __future__ import annotations
 
+import io
 import math
-import zlib
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
-from xml.parsers import expat
+from xml.etree.ElementTree import Element, ParseError
+
+from defusedxml.common import DefusedXmlException
+from defusedxml.ElementTree import iterparse
 
 from harness.errors import UsageError
-from harness.files import check_file
+from harness.road.xml.xml_file import number_of, xml_bytes
 
 MOST_BYTES = 100_000_000
 """Of a map to convert, unpacked."""
-_CHUNK_BYTES = 1 << 20
-_GZIP = 16 + zlib.MAX_WBITS
 _CUT = "cut out the part around the junction, for instance with: osmium extract --bbox WEST,SOUTH,EAST,NORTH"
 _FOR_CARS = {
     *("motorway", "trunk", "primary", "secondary", "tertiary", "unclassified", "residential", "living_street"),
@@ -58,6 +57,8 @@ class MapFacts:
     rules: set[str] = field(default_factory=set)  # RHT and LHT, of the roads of an OpenDRIVE file
     broken: tuple[str, str] | None = None  # the first road of an OpenDRIVE file that is not sound, and why
     uneven: str = ""  # the first road with left-hand traffic whose two directions have different lanes
+    junctions: set[str] = field(default_factory=lambda: {_OPEN_ROAD})  # of an OpenDRIVE file
+    road_within: dict[str, str] = field(default_factory=dict)  # the first road of each junction that roads name
 
 
 def kind_of(path: Path) -> MapKind:
@@ -79,140 +80,71 @@ def facts_of(path: Path, kind: MapKind) -> MapFacts:
     one without roads, and for one with a road that is not sound.
     """
     facts = MapFacts()
-    reader = _OsmReader(facts) if kind is MapKind.OSM else _OpenDriveReader(facts)
-    parser = expat.ParserCreate()
-
-    def refuse(*_: object) -> None:
-        raise UsageError.of(path, "", "carries XML entities or a document type", "remove them")
-
-    def start(tag: str, attributes: dict[str, str]) -> None:
-        parser.StartElementHandler = reader.start
-        if tag != reader.root:
-            raise UsageError.of(path, tag, f"its root is not {reader.root}", "name another file, or rename it")
-
-    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = refuse
-    parser.StartElementHandler, parser.EndElementHandler = start, reader.end
+    if kind is MapKind.OSM:
+        note, root, missing = _note_osm, "osm", "no way has the tag highway with a class of roads"
+    else:
+        note, root, missing = _note_opendrive, "OpenDRIVE", "it has no element road with a lane for driving"
+    tag = ""
     try:
-        for part in _parts(path):
-            parser.Parse(part, False)
-        parser.Parse(b"", True)
-    except expat.ExpatError as error:
+        for _, element in iterparse(io.BytesIO(xml_bytes(path, MOST_BYTES)), forbid_dtd=True):
+            element.tag = tag = element.tag.rpartition("}")[2]  # without its namespace
+            note(element, facts)
+    except FileNotFoundError:
+        raise UsageError.of(path, "", "there is no such file", "name another file") from None
+    except OSError as error:
+        raise UsageError.of(path, "", str(error.strerror), _CUT) from None
+    except DefusedXmlException:
+        raise UsageError.of(path, "", "carries XML entities or a document type", "remove them") from None
+    except (ParseError, ValueError, LookupError, RecursionError) as error:
         raise UsageError.of(path, "", f"is not readable XML: {error}", "export it again") from None
+    if tag != root:
+        raise UsageError.of(path, tag, f"its root is not {root}", "name another file, or rename it")
     if facts.broken is not None:
         raise UsageError.of(path, *facts.broken, "repair the map, or export it again")
     if not facts.roads:
-        raise UsageError.of(path, "", f"has no road for cars: {reader.missing}", "export an area with roads")
+        raise UsageError.of(path, "", f"has no road for cars: {missing}", "export an area with roads")
     return facts
 
 
-class _OsmReader:
-    """Counts the roads among the ways of an OpenStreetMap file."""
-
-    root, missing = "osm", "no way has the tag highway with a class of roads"
-
-    def __init__(self, facts: MapFacts) -> None:
-        self._facts, self._in_way, self._is_road, self._has_layer = facts, False, False, False
-
-    def start(self, tag: str, attributes: dict[str, str]) -> None:
-        if tag == "way":
-            self._in_way, self._is_road, self._has_layer = True, False, False
-        elif tag == "tag" and self._in_way:
-            key, value = attributes.get("k"), attributes.get("v", "")
-            self._is_road |= key == "highway" and value in _FOR_CARS
-            self._has_layer |= key == "layer" and value.lstrip("+-").strip("0") != ""
-
-    def end(self, tag: str) -> None:
-        if tag == "way":
-            self._in_way = False
-            self._facts.roads += self._is_road
-            self._facts.has_layers |= self._is_road and self._has_layer
+def _note_osm(element: Element, facts: MapFacts) -> None:
+    """Count the roads among the ways of an OpenStreetMap file."""
+    if element.tag == "way":
+        tags = {each.get("k"): each.get("v", "") for each in element.iter("tag")}
+        is_road = tags.get("highway") in _FOR_CARS
+        facts.roads += is_road
+        facts.has_layers |= is_road and tags.get("layer", "").lstrip("+-").strip("0") != ""
+    if element.tag in ("node", "way", "relation"):
+        element.clear()
 
 
-class _OpenDriveReader:
-    """Counts the roads of an OpenDRIVE file, and compares the lanes of the two directions of left-hand roads.
+def _note_opendrive(element: Element, facts: MapFacts) -> None:
+    """Count the roads of an OpenDRIVE file, and compare the lanes of the two directions of left-hand roads.
 
     Finds what netconvert takes for sound although it is not: numbers that are none, roads in a missing junction.
     """
-
-    root, missing = "OpenDRIVE", "it has no element road with a lane for driving"
-
-    def __init__(self, facts: MapFacts) -> None:
-        self._facts, self._road, self._rule, self._side = facts, "", "RHT", ""
-        self._lanes = {"left": 0, "right": 0}
-        self._junctions: set[str] = {_OPEN_ROAD}
-        self._road_within: dict[str, str] = {}  # the first road of each junction that roads name
-
-    def start(self, tag: str, attributes: dict[str, str]) -> None:
-        if tag == "road":
-            self._road, self._rule = attributes.get("id", ""), attributes.get("rule", "RHT")
-            self._facts.rules.add(self._rule)
-            self._road_within.setdefault(attributes.get("junction", _OPEN_ROAD), self._road)
-        elif tag == "junction":
-            self._junctions.add(attributes.get("id", ""))
-        elif tag in ("left", "center", "right"):
-            self._side = tag
-        elif tag == "laneSection":
-            self._lanes = {"left": 0, "right": 0}
-        elif tag == "lane" and attributes.get("type") in _DRIVING and self._side in self._lanes:
-            self._facts.roads += not any(self._lanes.values())
-            self._lanes[self._side] += 1
-        for name in _NUMBERS.get(tag, ()):
-            if name in attributes and not _is_number(attributes[name]):
-                self._note_broken(self._road, f"{name} of its {tag} is {attributes[name]!r}, not a number")
-
-    def end(self, tag: str) -> None:
-        if tag == "laneSection" and self._rule == "LHT" and self._lanes["left"] != self._lanes["right"]:
-            self._facts.uneven = self._facts.uneven or self._road
-        elif tag == self.root:
-            for junction, road in self._road_within.items():
-                if junction not in self._junctions:
-                    self._note_broken(road, f"it lies in junction {junction!r}, which the map does not have")
-
-    def _note_broken(self, road: str, why: str) -> None:
-        self._facts.broken = self._facts.broken or (f"road {road}", why)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        return math.isfinite(float(text))
-    except ValueError:
-        return False
-
-
-def _parts(path: Path) -> Iterator[bytes]:
-    """The content of a plain file in parts, unpacked if its name ends with `.gz`. Raises UsageError."""
-    try:
-        check_file(path, MOST_BYTES)
-        with path.open("rb") as file:
-            yield from _limited(path, _unpacked(path, lambda: file.read(_CHUNK_BYTES)))
-    except OSError as error:
-        missing = isinstance(error, FileNotFoundError)
-        message = "there is no such file" if missing else str(error.strerror)
-        raise UsageError.of(path, "", message, "name another file" if missing else _CUT) from None
-
-
-def _limited(path: Path, parts: Iterator[bytes]) -> Iterator[bytes]:
-    size = 0
-    for part in parts:
-        size += len(part)
-        if size > MOST_BYTES:
-            raise UsageError.of(path, "", f"holds more than {MOST_BYTES / 1e6:,.0f} MB", _CUT)
-        yield part
-
-
-def _unpacked(path: Path, read: Callable[[], bytes]) -> Iterator[bytes]:
-    if path.suffix.lower() != ".gz":
-        yield from iter(read, b"")
-        return
-    unpacking, rest, pending = zlib.decompressobj(_GZIP), b"", False
-    try:
-        while rest or (rest := read()):
-            pending = True
-            yield unpacking.decompress(rest, _CHUNK_BYTES)
-            rest = unpacking.unconsumed_tail
-            if unpacking.eof:
-                unpacking, rest, pending = zlib.decompressobj(_GZIP), unpacking.unused_data, False
-    except zlib.error as error:
-        raise UsageError.of(path, "", f"is not a gzip file: {error}", "compress it again, or remove .gz") from None
-    if pending:
-        raise UsageError.of(path, "", "is cut off: its gzip data has no end", "compress it again")
+    if element.tag == "junction":
+        facts.junctions.add(element.get("id", ""))
+    elif element.tag == "road":
+        name, rule = element.get("id", ""), element.get("rule", "RHT")
+        facts.rules.add(rule)
+        facts.road_within.setdefault(element.get("junction", _OPEN_ROAD), name)
+        for section in element.iter("laneSection"):
+            left, right = (
+                sum(lane.get("type") in _DRIVING for lane in section.iterfind(f"{side}/lane"))
+                for side in ("left", "right")
+            )
+            facts.roads += bool(left or right)
+            if rule == "LHT" and left != right:
+                facts.uneven = facts.uneven or name
+        for part in element.iter():
+            for key in _NUMBERS.get(part.tag, ()):
+                value = part.get(key, "0")
+                if math.isnan(number_of(value)):
+                    why = f"{key} of its {part.tag} is {value!r}, not a number"
+                    facts.broken = facts.broken or (f"road {name}", why)
+        element.clear()
+    elif element.tag == "OpenDRIVE":
+        for junction, road in facts.road_within.items():
+            if junction not in facts.junctions:
+                why = f"it lies in junction {junction!r}, which the map does not have"
+                facts.broken = facts.broken or (f"road {road}", why)

@@ -8,9 +8,9 @@ from enum import Enum, auto
 from itertools import combinations
 
 import numpy as np
+from shapely.geometry.base import BaseGeometry
 from sumolib.net import Net
 from sumolib.net.connection import Connection
-from sumolib.net.node import Node
 
 from harness.game.arrays import FloatArray
 from harness.road.net.network import lane_line
@@ -45,37 +45,50 @@ def listed_conflicts(net: Net, junctions: Sequence[str]) -> list[ListedConflict]
     """The conflicts at junctions, numbered from 1 in the order of the junctions."""
     feeders = Feeders(net)
     found: list[ListedConflict] = []
-    for name in junctions:
-        for first, second, place in _conflicts(net.getNode(name), feeders):
-            found.append(_listed(len(found) + 1, name, one=first, other=second, place=place))
+    for junction in junctions:
+        links = net.getNode(junction).getConnections()
+        streams = {link: Stream(link, feeders) for link in links}
+        for one, other in foe_pairs(links):
+            overlap = overlap_of(streams[one], streams[other])
+            if overlap is None:
+                continue
+            first, second, priority = in_order(one, other)
+            found.append(
+                ListedConflict(
+                    number=len(found) + 1,
+                    junction=junction,
+                    merging=one.getToLane() is other.getToLane(),
+                    first=(first.getFromLane().getID(), first.getToLane().getID()),
+                    second=(second.getFromLane().getID(), second.getToLane().getID()),
+                    priority=priority,
+                    with_signals=bool(one.getTLSID() or other.getTLSID()),
+                    place=place_of(one, other, overlap),
+                )
+            )
     return found
 
 
-def _conflicts(node: Node, feeders: Feeders) -> Iterator[tuple[Connection, Connection, FloatArray]]:
-    foes = {link: set(foes_of(link)) for link in node.getConnections()}
-    streams = {link: Stream(link, feeders) for link in foes}
-    for one, other in combinations(foes, 2):
-        if other not in foes[one] or one not in foes[other]:
-            continue
-        overlap = overlap_of(streams[one], streams[other])
-        if overlap is not None:
-            merging = one.getToLane() is other.getToLane()
-            place = lane_line(one.getToLane())[0] if merging else np.array(overlap.centroid.coords[0])
-            yield one, other, place
+def foe_pairs(links: Sequence[Connection]) -> Iterator[tuple[Connection, Connection]]:
+    """The connections of a junction whose traffic may be in conflict, two by two."""
+    foes = {link: set(foes_of(link)) for link in links}
+    for one, other in combinations(links, 2):
+        if other in foes[one] and one in foes[other]:
+            yield one, other
 
 
-def _listed(number: int, junction: str, *, one: Connection, other: Connection, place: FloatArray) -> ListedConflict:
+def in_order(one: Connection, other: Connection) -> tuple[Connection, Connection, Priority]:
+    """Two connections and their priority; if one of them has it, it is the first."""
     one_yields, first_come = yields_to(one, other)
     other_yields, _ = yields_to(other, one)
-    first, second = (other, one) if one_yields and not first_come else (one, other)
-    priority = Priority.FIRST if one_yields or other_yields else Priority.NONE
-    return ListedConflict(
-        number=number,
-        junction=junction,
-        merging=one.getToLane() is other.getToLane(),
-        first=(first.getFromLane().getID(), first.getToLane().getID()),
-        second=(second.getFromLane().getID(), second.getToLane().getID()),
-        priority=Priority.FIRST_TO_ARRIVE if first_come else priority,
-        with_signals=bool(one.getTLSID() or other.getTLSID()),
-        place=place,
-    )
+    if first_come:
+        return one, other, Priority.FIRST_TO_ARRIVE
+    if not one_yields and not other_yields:
+        return one, other, Priority.NONE
+    return (other, one, Priority.FIRST) if one_yields else (one, other, Priority.FIRST)
+
+
+def place_of(one: Connection, other: Connection, overlap: BaseGeometry) -> FloatArray:
+    """[2] where two connections with a common area cross, or where the lane begins to which both lead."""
+    if one.getToLane() is other.getToLane():
+        return lane_line(one.getToLane())[0]
+    return np.array(overlap.centroid.coords[0])

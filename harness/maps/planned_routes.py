@@ -87,7 +87,7 @@ def _with_goal(net: Net, edges: Sequence[Edge], place: int) -> PlannedRoute | No
     share = (goal_m - starts[2 * k]) / max(ends[k] - starts[2 * k], 1e-9)
     return PlannedRoute(
         edges=tuple(edge.getID() for edge in edges),
-        line=_sampled(line, goal_m),
+        line=sampled_to(line, goal_m),
         junction_m=ends[place],
         goal_edge=edges[k].getID(),
         goal_position_m=float(np.floor(10.0 * share * edges[k].getLength()) / 10.0),
@@ -96,7 +96,8 @@ def _with_goal(net: Net, edges: Sequence[Edge], place: int) -> PlannedRoute | No
     )
 
 
-def _sampled(line: shapely.LineString, until_m: float) -> FloatArray:
+def sampled_to(line: shapely.LineString, until_m: float) -> FloatArray:
+    """[n, 2] points of a line every `SPACING_M` up to a station."""
     stations = np.arange(0.0, until_m + 1e-6, SPACING_M)
     return np.asarray(shapely.get_coordinates(shapely.line_interpolate_point(line, stations)))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from itertools import pairwise
 from math import inf
@@ -19,12 +19,15 @@ from harness.road.demand.walks import unsafe_net, walk_problems
 from harness.road.net import network
 from harness.road.xml.xml_file import number_of
 
-LANES = ("random", "free", "allowed", "best", "first")
-POSITIONS = ("random", "free", "random_free", "base", "last")
-SPEEDS = ("random", "max", "desired", "speedLimit", "last", "avg")
-ARRIVAL_LANES = ("current", "random", "first")
-ARRIVAL_POSITIONS = ("random", "max", "center")
-ARRIVAL_SPEEDS = ("current",)
+_WORDS = {
+    "departLane": ("random", "free", "allowed", "best", "first"),
+    "departPos": ("random", "free", "random_free", "base", "last"),
+    "departSpeed": ("random", "max", "desired", "speedLimit", "last", "avg"),
+    "arrivalLane": ("current", "random", "first"),
+    "arrivalPos": ("random", "max", "center"),
+    "arrivalSpeed": ("current",),
+}
+"""What an attribute may be beside a number."""
 _MOST_PROBLEMS = 20
 _ROUNDED = 1.001  # recorded speeds and speed factors are rounded; SUMO raises the factor
 _ALL_THE_TIME_S = (0.0, inf)
@@ -80,7 +83,10 @@ def check_departures(
         if edges and departure.on_foot:
             problems += [Problem(*where, *each) for each in walk_problems(departure, edges)]
         elif edges:
-            problems += [Problem(*where, *each) for each in _gaps(edges)]
+            for edge, following in pairwise(edges):
+                if not edge.getConnections(following):
+                    message = f"its route has no connection from edge {edge.getID()!r} to {following.getID()!r}"
+                    problems.append(Problem(*where, message, "correct the route's edges"))
             problems += _end_problems(*where, departure, first=edges[0], last=edges[-1], routes=routes)
             kind = routes.types[departure.vehicle_type].vehicle_class
             problems += stop_problems(*where, stops=departure.stops, edges=edges, vehicle_class=kind)
@@ -90,64 +96,24 @@ def check_departures(
         raise UsageError(problems)
 
 
-def _gaps(edges: Sequence[Edge]) -> list[tuple[str, str]]:
-    """Message and remedy for each two consecutive edges without a connection."""
-    return [
-        (
-            f"its route has no connection from edge {edge.getID()!r} to {following.getID()!r}",
-            "correct the route's edges",
-        )
-        for edge, following in pairwise(edges)
-        if not edge.getConnections(following)
-    ]
-
-
 def _end_problems(
     file: str, key: str, departure: Departure, *, first: Edge, last: Edge, routes: RouteFile
-) -> list[Problem]:
+) -> Iterator[Problem]:
     """The problems of a departure's lane, position and speed on its first edge, and on arrival on its last edge."""
     most_mps = routes.types[departure.vehicle_type].max_speed_mps
     factor = max(departure.speed_factor * _ROUNDED, 1.0) if departure.speed_factor else 1.0
+    fastest_mps = min(first.getSpeed() * factor, most_mps)
     written = (departure.lane, departure.position, departure.speed)
-    checks = [
-        *_checks(
-            "depart",
-            first,
-            fastest=min(first.getSpeed() * factor, most_mps),
-            written=written,
-            words=(LANES, POSITIONS, SPEEDS),
-        ),
-        *_checks(
-            "arrival",
-            last,
-            fastest=most_mps,
-            written=departure.arrival,
-            words=(ARRIVAL_LANES, ARRIVAL_POSITIONS, ARRIVAL_SPEEDS),
-        ),
-    ]
-    return [
-        Problem(
-            file, f"{key}.{name}", f"{value[:60]!r} is not possible here", f"give {valid}, or {nearest(value, words)}"
-        )
-        for name, value, words, fits, valid in checks
-        if value not in words and not fits(number_of(value))
-    ]
-
-
-_Check = tuple[str, str, Sequence[str], Callable[[float], bool], str]
-
-
-def _checks(
-    prefix: str, edge: Edge, *, fastest: float, written: Sequence[str], words: Sequence[Sequence[str]]
-) -> list[_Check]:
-    """For lane, position and speed: attribute, value, words, whether a number is possible, and which ones are."""
-    lanes, length = edge.getLaneNumber(), edge.getLength()
-    possible: Sequence[tuple[str, Callable[[float], bool], str]] = (
-        ("Lane", lambda lane: lane in range(lanes), f"a lane from 0 to {lanes - 1}"),
-        ("Pos", lambda m: abs(m) <= length, f"up to {length:g} m, the edge's end"),
-        ("Speed", lambda mps: 0.0 <= mps <= fastest, f"from 0 to {fastest:g} m/s"),
-    )
-    return [
-        (prefix + name, value, several, fits, valid)
-        for (name, fits, valid), value, several in zip(possible, written, words, strict=True)
-    ]
+    for end, edge, highest_mps, (lane, position, speed) in (
+        ("depart", first, fastest_mps, written),
+        ("arrival", last, most_mps, departure.arrival),
+    ):
+        lanes, length_m = edge.getLaneNumber(), edge.getLength()
+        for name, value, fits, valid in (
+            (f"{end}Lane", lane, number_of(lane) in range(lanes), f"a lane from 0 to {lanes - 1}"),
+            (f"{end}Pos", position, abs(number_of(position)) <= length_m, f"up to {length_m:g} m, the edge's end"),
+            (f"{end}Speed", speed, 0.0 <= number_of(speed) <= highest_mps, f"from 0 to {highest_mps:g} m/s"),
+        ):
+            if not fits and value not in _WORDS[name]:
+                remedy = f"give {valid}, or {nearest(value, _WORDS[name])}"
+                yield Problem(file, f"{key}.{name}", f"{value[:60]!r} is not possible here", remedy)

@@ -20,12 +20,12 @@ from harness.road.demand.route_file import (
     RouteChoice,
     VehicleType,
 )
-from harness.road.demand.stops import Stop, StopPlace, stop_in
-from harness.road.xml.xml_file import number_in, required
+from harness.road.demand.stops import StopPlace, stop_in
+from harness.road.xml.xml_file import number_in, number_of, required
 
 _MOST_EDGES = 10_000
 # the range of each number: above the first value, up to the second
-RANGES = {
+_RANGES = {
     "length": (0.0, 100.0),
     "width": (0.0, 10.0),
     "maxSpeed": (0.0, 200.0),
@@ -61,8 +61,8 @@ class NamedRoutes:
 
 
 def ranged(path: Path, element: ElementTree.Element, name: str, default: float) -> float:
-    """The number of an attribute in its range of `RANGES`. Raises UsageError."""
-    above, most = RANGES[name]
+    """The number of an attribute in its range. Raises UsageError."""
+    above, most = _RANGES[name]
     number = number_in(path, f"{element.tag} {element.get('id', '')}", element, name, above=above, most=most)
     return default if number is None else number
 
@@ -77,7 +77,9 @@ def read_types(path: Path, root: ElementTree.Element, problems: list[Problem]) -
         vehicle_type = collect(problems, partial(_vehicle_type, path, element))
         if vehicle_type is not None:
             types[vehicle_type.name] = vehicle_type
-            weights[vehicle_type.name] = collect(problems, partial(_share, path, element)) or 0.0
+            share = collect(problems, partial(_share, path, element))
+            if share is not None:
+                weights[vehicle_type.name] = share
     mixes = {}
     for element in root.iter("vTypeDistribution"):
         mix = collect(problems, partial(_mix, path, element, types, weights))
@@ -117,44 +119,36 @@ def route_in(path: Path, element: ElementTree.Element, places: Mapping[str, Stop
         raise UsageError.of(path, f"{where}.repeat", message, "choose fewer repetitions")
     stops = tuple(stop_in(path, where, each, places) for each in element.findall("stop"))
     cycle_s = number_in(path, where, element, "cycleTime", above=0.0, most=1e6) or 0.0
+    share = _share(path, element)
     return RouteChoice(
-        share=_share(path, element),
+        share=1.0 if share is None else share,
         edges=edges * passes,
-        stops=tuple(_in_pass(stop, k * cycle_s) for k in range(passes) for stop in stops),
+        stops=tuple(stop.later(k * cycle_s) for k in range(passes) for stop in stops),
     )
 
 
 def choices_in(path: Path, element: ElementTree.Element, named: NamedRoutes) -> tuple[RouteChoice, ...]:
     """The routes of a route distribution. Raises UsageError."""
     where = f"routeDistribution {element.get('id')}" if element.get("id") else "routeDistribution"
-    shares = _shares(path, where, element)
+
+    def listed(name: str, share: float | None) -> list[RouteChoice]:
+        if name not in named.routes:
+            raise UsageError.of(path, where, f"unknown route {name!r}", nearest(name, named.routes))
+        return [each if share is None else replace(each, share=share) for each in named.routes[name]]
+
     choices: list[RouteChoice] = []
-    for k, name in enumerate(element.get("routes", "").split()):
-        choices += _shared(_named(path, where, name, named), shares[k] if k < len(shares) else None)
+    names = element.get("routes", "").split()
+    for name, share in zip(names, _shares(path, where, element, len(names)), strict=True):
+        choices += listed(name, share)
     for child in element.findall("route"):
         if child.get("edges") is None:
-            share = _share(path, child) if child.get("probability") else None
-            choices += _shared(_named(path, where, child.get("refId", ""), named), share)
+            choices += listed(child.get("refId", ""), _share(path, child))
         else:
             choices.append(route_in(path, child, named.places))
     choices = [each for each in choices if each.share > 0.0]
     if not choices:
         raise UsageError.of(path, where, "has no route with a probability above 0", "give it routes")
     return tuple(choices)
-
-
-def _in_pass(stop: Stop, later_s: float) -> Stop:
-    return stop.later(later_s)
-
-
-def _named(path: Path, where: str, name: str, named: NamedRoutes) -> tuple[RouteChoice, ...]:
-    if name not in named.routes:
-        raise UsageError.of(path, where, f"unknown route {name!r}", nearest(name, named.routes))
-    return named.routes[name]
-
-
-def _shared(choices: tuple[RouteChoice, ...], share: float | None) -> list[RouteChoice]:
-    return [each if share is None else replace(each, share=share) for each in choices]
 
 
 def _vehicle_type(path: Path, element: ElementTree.Element) -> VehicleType:
@@ -176,34 +170,35 @@ def _mix(
     path: Path, element: ElementTree.Element, types: Mapping[str, VehicleType], weights: Mapping[str, float]
 ) -> Mix:
     where = f"vTypeDistribution {required(path, element, 'id')}"
-    shares = _shares(path, where, element)
     names = element.get("vTypes", "").split()
-    members = [(name, shares[k] if k < len(shares) else weights.get(name, 1.0)) for k, name in enumerate(names)]
+    listed = [*zip(names, _shares(path, where, element, len(names)), strict=True)]
     for child in element.findall("vType"):
-        reference = child.get("refId")
-        name = reference if reference is not None else required(path, child, "id")
-        members.append((name, weights.get(name, 1.0) if child.get("probability") is None else _share(path, child)))
-    for name, _ in members:
+        name = required(path, child, "id" if child.get("refId") is None else "refId")
+        listed.append((name, _share(path, child)))
+    members: list[tuple[str, float]] = []
+    for name, share in listed:
         if name not in types:
             raise UsageError.of(path, where, f"unknown vehicle type {name!r}", nearest(name, types))
+        members.append((name, weights.get(name, 1.0) if share is None else share))
     members = [each for each in members if each[1] > 0.0]
     if not members:
         raise UsageError.of(path, where, "has no vehicle type with a probability above 0", "give it vehicle types")
     return Mix(types=tuple(name for name, _ in members), shares=tuple(share for _, share in members))
 
 
-def _share(path: Path, element: ElementTree.Element) -> float:
-    share = number_in(path, f"{element.tag} {element.get('id', '')}", element, "probability", above=-0.001, most=1e9)
-    return 1.0 if share is None else share
+def _share(path: Path, element: ElementTree.Element) -> float | None:
+    where = f"{element.tag} {element.get('id', '')}"
+    return number_in(path, where, element, "probability", above=-0.001, most=1e9)
 
 
-def _shares(path: Path, where: str, element: ElementTree.Element) -> list[float]:
-    one = ElementTree.Element("share")
-    shares = []
-    for text in element.get("probabilities", "").split():
-        one.set("probabilities", text)
-        shares.append(number_in(path, where, one, "probabilities", above=-0.001, most=1e9) or 0.0)
-    return shares
+def _shares(path: Path, where: str, element: ElementTree.Element, count: int) -> list[float | None]:
+    """The first `count` probabilities of a distribution; None for those that it does not give."""
+    text = element.get("probabilities", "")
+    shares = [number_of(each) for each in text.split()]
+    if not all(0.0 <= each <= 1e9 for each in shares):
+        message = f"{text[:60]!r} is not a list of numbers that are possible here"
+        raise UsageError.of(path, f"{where}.probabilities", message, "give a number from 0 on for each")
+    return [*shares, *[None] * count][:count]
 
 
 def _place(path: Path, element: ElementTree.Element) -> StopPlace:

@@ -39,9 +39,9 @@ CAR_SIZE_M = (5.0, 1.8)
 """Those of all other classes."""
 DESIRED_SPEEDS_MPS = {"bicycle": 20.0 / 3.6, "pedestrian": 5.0 / 3.6}
 """The desiredMaxSpeed of a vType without one, by its class. Other classes have none."""
-
-
-DEFAULT_TYPE = "DEFAULT_VEHTYPE"
+DEFAULT_TYPE, DEFAULT_PERSONS_TYPE = "DEFAULT_VEHTYPE", "DEFAULT_PEDTYPE"
+PLACES = ("base", "center", "max", "random")
+"""Words for the places of persons along an edge."""
 SHARE = " of the room"
 """The ending of a drawn place across the lane: a share, from -1 (right) to 1 (left), of the room beside the vehicle."""
 EDGE_SHARE = " of the edge"

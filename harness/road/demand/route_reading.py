@@ -15,14 +15,34 @@ from harness.config.toml_reading import nearest
 from harness.errors import Problem, UsageError, collect
 from harness.road.demand.flows import LEAST_PERIOD_S, MOST_AT_ONCE, FlowRate
 from harness.road.demand.route_elements import NamedRoutes, Types, choices_in, ranged, read_routes, read_types, route_in
-from harness.road.demand.route_file import DEFAULT_TYPE, Departure, Flow, RouteChoice, RouteFile
-from harness.road.demand.route_people import DEFAULT_PERSONS_TYPE, PEOPLE, PERSONS_TYPE, person_in
-from harness.road.demand.route_schema import FLOW_RATES, VEHICLES, check_content
+from harness.road.demand.route_file import (
+    DEFAULT_PERSONS_TYPE,
+    DEFAULT_TYPE,
+    DESIRED_SPEEDS_MPS,
+    PLACES,
+    SIZES_M,
+    Departure,
+    Flow,
+    RouteChoice,
+    RouteFile,
+    VehicleType,
+)
+from harness.road.demand.route_schema import FLOW_RATES, FLOWS, PEOPLE, VEHICLES, check_content
 from harness.road.demand.stops import stop_in
 from harness.road.xml.xml_file import number_in, number_of, parse_xml, required, seconds_in
 
 _RANDOM_PERIOD = re.compile(r"exp\((.+)\)")
 _LATERAL = ("left", "right", "center", "random")
+_ON_FOOT = "pedestrian"
+_PERSONS_TYPE = VehicleType(
+    name=DEFAULT_PERSONS_TYPE,
+    length_m=SIZES_M[_ON_FOOT][0],
+    width_m=SIZES_M[_ON_FOOT][1],
+    max_speed_mps=37.58 / 3.6,
+    desired_speed_mps=DESIRED_SPEEDS_MPS[_ON_FOOT],
+    vehicle_class=_ON_FOOT,
+)
+_FASTEST_WALK_MPS = 12.5
 
 
 def read_route_file(path: Path, *additional: Path) -> RouteFile:
@@ -36,20 +56,19 @@ def read_route_file(path: Path, *additional: Path) -> RouteFile:
     types = read_types(path, only_types, problems)
     elements = _travellers(root)
     if any(each.tag in PEOPLE for each in elements):
-        types = replace(types, types={DEFAULT_PERSONS_TYPE: PERSONS_TYPE, **types.types})
+        types = replace(types, types={DEFAULT_PERSONS_TYPE: _PERSONS_TYPE, **types.types})
     named = read_routes(path, root, problems)
     vehicles: dict[str, Departure] = {}
     flows: dict[str, Flow] = {}
     for element in elements:
-        person = element.tag in PEOPLE
-        read = partial(person_in, path, element, types) if person else partial(_departure, path, element, named, types)
-        departure = collect(problems, read)
+        read = partial(_person, path, element) if element.tag in PEOPLE else partial(_departure, path, element, named)
+        departure = collect(problems, partial(read, types))
         if departure is None:
             continue
         if departure.name in vehicles or departure.name in flows:
             where = f"{element.tag} {departure.name}"
             problems.append(Problem(str(path), where, "stands twice", "rename one of the two"))
-        elif element.tag in ("flow", "personFlow"):
+        elif element.tag in FLOWS:
             flow = collect(problems, partial(_flow, path, element, departure))
             if flow is not None:
                 flows[departure.name] = flow
@@ -88,17 +107,16 @@ def _travellers(root: ElementTree.Element) -> list[ElementTree.Element]:
 
 
 def _departure(path: Path, element: ElementTree.Element, named: NamedRoutes, types: Types) -> Departure:
-    where = f"{element.tag} {required(path, element, 'id')}"
-    kind = element.get("type", DEFAULT_TYPE)
-    if kind not in types.names():
-        raise UsageError.of(path, where, f"unknown vehicle type {kind!r}", nearest(kind, types.names()))
-    choices = _choices(path, where, element, named)
+    where, kind = _name_and_type(path, element, types, DEFAULT_TYPE)
+    choices = tuple(_cut(path, where, element, each) for each in _choices(path, where, element, named))
+    if not all(each.edges for each in choices):
+        raise UsageError.of(path, where, "its route has no edges", "give the route's edges")
     stops = tuple(stop_in(path, where, each, named.places) for each in element.findall("stop"))
     departure = Departure(
         name=required(path, element, "id"),
         vehicle_type=kind,
         edges=(),
-        depart_s=seconds_in(path, where, element, "begin" if element.tag == "flow" else "depart") or 0.0,
+        depart_s=_depart_s(path, where, element),
         lane=element.get("departLane", "first"),
         position=element.get("departPos", "base"),
         speed=element.get("departSpeed", "0"),
@@ -113,12 +131,65 @@ def _departure(path: Path, element: ElementTree.Element, named: NamedRoutes, typ
     )
     if not choices:
         return replace(departure, trip=_trip(path, where, element, departure))
-    choices = tuple(_cut(path, where, element, each) for each in choices)
-    if any(not each.edges for each in choices):
-        raise UsageError.of(path, where, "its route has no edges", "give the route's edges")
     if len(choices) == 1:
         return replace(departure, edges=choices[0].edges, stops=choices[0].stops + stops)
     return replace(departure, choices=choices)
+
+
+def _person(path: Path, element: ElementTree.Element, types: Types) -> Departure:
+    """The person that an element describes, or the first one of its flow. It has one walk.
+
+    libsumo inserts a person with the edges of its walk. Rides, stops and journeys by several means need vehicles and
+    stops that wait for one another, which the harness does not insert.
+    """
+    where, kind = _name_and_type(path, element, types, DEFAULT_PERSONS_TYPE)
+    for name in types.mixes[kind].types if kind in types.mixes else (kind,):
+        if types.types[name].vehicle_class != _ON_FOOT:
+            message = f"its type {name!r} is of the class {types.types[name].vehicle_class}"
+            raise UsageError.of(path, f"{where}.type", message, f'give a vType with vClass="{_ON_FOOT}"')
+    walks = element.findall("walk")
+    if len(walks) != 1:
+        message = f"has {len(walks) or 'no'} {'walks' if walks else 'walk'}, one is possible"
+        raise UsageError.of(path, where, message, "give one walk over all edges")
+    walk = walks[0]
+    edges, ends = tuple(walk.get("edges", "").split()), tuple(filter(None, (walk.get("from"), walk.get("to"))))
+    if not edges and len(ends) != 2:
+        raise UsageError.of(path, f"{where}.walk", "has no edges", "give its edges, or from and to")
+    places = {"departPos": "0", "arrivalPos": "center"}
+    for name, default in places.items():
+        places[name] = text = walk.get(name, element.get(name, default))
+        if text not in PLACES and not np.isfinite(number_of(text)):
+            message = f"{text[:60]!r} is not a place along an edge"
+            raise UsageError.of(path, f"{where}.{name}", message, f"give metres, or {nearest(text, PLACES)}")
+    speed = number_in(path, f"{where}.walk", walk, "speed", above=0.0, most=_FASTEST_WALK_MPS)
+    if element.tag == "person":
+        required(path, element, "depart")
+    return Departure(
+        name=required(path, element, "id"),
+        vehicle_type=kind,
+        edges=edges,
+        trip=() if edges else ends,
+        depart_s=_depart_s(path, where, element),
+        lane="",
+        position=places["departPos"],
+        speed="" if speed is None else f"{speed:g}",
+        arrival=("", places["arrivalPos"], ""),
+        speed_factor=ranged(path, element, "speedFactor", 1.0) if element.get("speedFactor") else None,
+        on_foot=True,
+    )
+
+
+def _name_and_type(path: Path, element: ElementTree.Element, types: Types, default: str) -> tuple[str, str]:
+    """The name of an element in messages, and the type that it gives. Raises UsageError."""
+    where = f"{element.tag} {required(path, element, 'id')}"
+    kind = element.get("type", default)
+    if kind not in types.names():
+        raise UsageError.of(path, where, f"unknown vehicle type {kind!r}", nearest(kind, types.names()))
+    return where, kind
+
+
+def _depart_s(path: Path, where: str, element: ElementTree.Element) -> float:
+    return seconds_in(path, where, element, "begin" if element.tag in FLOWS else "depart") or 0.0
 
 
 def _choices(path: Path, where: str, element: ElementTree.Element, named: NamedRoutes) -> tuple[RouteChoice, ...]:
@@ -173,7 +244,7 @@ def _lateral(path: Path, where: str, element: ElementTree.Element) -> str:
 
 def _flow(path: Path, element: ElementTree.Element, departure: Departure) -> Flow:
     where = f"{element.tag} {departure.name}"
-    rates = [name for name in (*FLOW_RATES, "personsPerHour") if element.get(name) is not None]
+    rates = [name for name in FLOW_RATES if element.get(name) is not None]
     if not rates or (rates == ["number"] and element.get("end") is None):
         raise UsageError.of(path, where, "has no rate", "give one of period, vehsPerHour, probability")
     if len(set(rates) - {"number"}) > 1:

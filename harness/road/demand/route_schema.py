@@ -9,55 +9,112 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from functools import cache
 from pathlib import Path
 from xml.etree import ElementTree
 
 from harness.errors import Problem, UsageError
-from harness.road.demand.route_people import PEOPLE, kinds_of_people, without_other_stages
-from harness.road.demand.stops import STOP_ATTRIBUTES
-from harness.road.xml.element_kinds import PARAM, ElementKind, problems_in
+from harness.road.xml.element_kinds import ElementKind, problems_in
 
-ROOTS = ("routes", "additional", "flows", "trips")
 VEHICLES = ("vehicle", "trip", "flow")
-FLOW_RATES = ("number", "period", "vehsPerHour", "perHour", "probability")
+PEOPLE = ("person", "personFlow")
+FLOWS = ("flow", "personFlow")
+FLOW_RATES = ("number", "period", "vehsPerHour", "personsPerHour", "perHour", "probability")
+_ROOTS = ("routes", "additional", "flows", "trips")
 _NAME = re.compile(r"[^\s|\\'\";,<>&]{1,200}")
 _DRAWN_ONLY = ("imgFile", "osgFile", "emissionClass")
 _RECORDERS = r"(battery|elechybrid|emissions|fcd|tripinfo|vehroute)"
 _RECORDED_ONLY = re.compile(rf"has\.{_RECORDERS}\.device|device\.{_RECORDERS}\..*")
-_NO_EFFECT = {
-    "vehicle": (
-        "color",
-        "line",
-        "personNumber",
-        "containerNumber",
-        "parkingBadges",
-        "arrivalPosLat",
-        "fromTaz",
-        "toTaz",
+
+
+def _kind(children: str, *attributes: str) -> ElementKind:
+    return ElementKind(children.split(), " ".join(attributes).split())
+
+
+_VEHICLE = (
+    "id type departLane departPos departSpeed departPosLat departEdge",
+    "arrivalLane arrivalPos arrivalSpeed arrivalEdge speedFactor reroute insertionChecks",
+    "color line personNumber containerNumber parkingBadges arrivalPosLat fromTaz toTaz",  # without effect
+)
+_PERSON = "id type departPos arrivalPos color arrival speedFactor"
+_FLOW = "begin end number period perHour probability"
+_INSIDE = "route routeDistribution stop param"
+_KINDS = {
+    **dict.fromkeys(
+        _ROOTS,
+        _kind(" ".join((*VEHICLES, *PEOPLE, "vType vTypeDistribution route routeDistribution interval busStop"))),
     ),
-    "stop": ("arrival", "actType", "tripId", "line", "started", "ended", "actualArrival", "depart", "priority"),
-    "busStop": ("name", "lines", "personCapacity", "parkingLength", "color", "angle", "friendlyPos"),
-    "route": ("color", "cost", "savings", "probability", "routeLength"),
+    "vType": ElementKind(),  # SUMO checks its attributes
+    "vTypeDistribution": _kind("vType", "id vTypes probabilities"),
+    "route": _kind("stop param", "id refId edges repeat cycleTime color cost savings probability routeLength"),
+    "routeDistribution": _kind("route", "id last routes probabilities"),
+    "vehicle": _kind(_INSIDE, *_VEHICLE, "depart route arrival routeLength"),
+    "trip": _kind("stop param", *_VEHICLE, "depart from to via"),
+    "flow": _kind(_INSIDE, *_VEHICLE, "route from to via vehsPerHour", _FLOW),
+    "interval": _kind("flow", "id begin end"),
+    "stop": _kind(
+        "param",
+        "lane edge busStop startPos endPos friendlyPos duration until parking",
+        "arrival actType tripId line started ended actualArrival depart priority",  # without effect
+    ),
+    "busStop": _kind(
+        "param access",
+        "id lane startPos endPos",
+        "name lines personCapacity parkingLength color angle friendlyPos",  # without effect
+    ),
+    "access": _kind("", "lane pos length friendlyPos"),
+    "person": _kind("walk param", _PERSON, "depart"),
+    "personFlow": _kind("walk param", _PERSON, "personsPerHour", _FLOW),
+    "walk": _kind(
+        "param",
+        "edges from to departPos arrivalPos speed",
+        "cost routeLength exitTimes started ended waitingTime",  # without effect
+    ),
 }
 
-Reason = tuple[str, str]
-_NO_CONTAINERS: Reason = ("containers are not supported", "remove these elements")
-_NOT_EDGES: Reason = ("routes are found between edges only", "give edges as from, to and via")
-_NO_STATION: Reason = ("a stop at such a place is not supported", "give the stop's lane, startPos and endPos instead")
-_NO_CAUSE: Reason = ("nothing arrives that the stop could wait for", "give a duration instead")
-_REFUSED: Mapping[str, Reason] = {
-    **dict.fromkeys(("container", "containerFlow"), _NO_CONTAINERS),
+
+def _each_of(tags: str, names: str, message: str, remedy: str) -> dict[str, tuple[str, str]]:
+    return {f"{tag}.{name}": (message, remedy) for tag in tags.split() for name in names.split()}
+
+
+_REFUSED: Mapping[str, tuple[str, str]] = {
+    **dict.fromkeys(("container", "containerFlow"), ("containers are not supported", "remove these elements")),
     "include": ("is not understood here: other files are not read", "copy their content into this file"),
+    **_each_of(
+        "vehicle trip flow",
+        " ".join(f"{end}{kind}" for end in ("from", "to", "via") for kind in ("Junction", "Junctions", "XY", "LonLat")),
+        "routes are found between edges only",
+        "give edges as from, to and via",
+    ),
+    **_each_of(
+        "stop",
+        "trainStop containerStop chargingStation parkingArea lon lat",
+        "a stop at such a place is not supported",
+        "give the stop's lane, startPos and endPos instead",
+    ),
+    **_each_of(
+        "stop",
+        "triggered containerTriggered expected expectedContainers join split",
+        "nothing arrives that the stop could wait for",
+        "give a duration instead",
+    ),
+    **_each_of("stop", "speed jump jumpUntil extension", "is not supported", "leave it out"),
+    **_each_of(
+        "person personFlow",
+        "ride stop personTrip transport tranship access",
+        "is not supported: no vehicle takes persons along, and nothing comes that they wait for",
+        "remove it",
+    ),
+    **_each_of(
+        "walk",
+        " ".join(f"{end}{kind}" for end in ("from", "to") for kind in ("Taz", "XY", "LonLat", "Junction"))
+        + " busStop trainStop parkingArea containerStop chargingStation route viaJunctions",
+        "is not supported",
+        "give edges, or from and to",
+    ),
+    **_each_of("walk", "duration", "is not supported", "give a speed"),
+    **_each_of("walk", "departPosLat departLane", "is not supported: SUMO chooses the place", "leave it out"),
 }
-_REFUSED_OF_VEHICLES: Mapping[str, Reason] = dict.fromkeys(
-    (f"{end}{kind}" for end in ("from", "to", "via") for kind in ("Junction", "Junctions", "XY", "LonLat")), _NOT_EDGES
-)
-_REFUSED_OF_STOPS: Mapping[str, Reason] = {
-    **dict.fromkeys(("trainStop", "containerStop", "chargingStation", "parkingArea", "lon", "lat"), _NO_STATION),
-    **dict.fromkeys(("triggered", "containerTriggered", "expected", "expectedContainers", "join", "split"), _NO_CAUSE),
-    **dict.fromkeys(("speed", "jump", "jumpUntil", "extension"), ("is not supported", "leave it out")),
-}
+"""Message and remedy of refused elements, and of attributes and children after the tag of their element."""
 _ONLY = {"reroute": ("false", "0"), "insertionChecks": ("all",)}  # the values of attributes that have no other
 
 
@@ -66,18 +123,11 @@ def check_content(path: Path, root: ElementTree.Element) -> None:
 
     Removes from the tree what only draws or records.
     """
-    if root.tag not in ROOTS:
+    if root.tag not in _ROOTS:
         message = "is not a SUMO route file: its root is not routes"
         raise UsageError.of(path, str(root.tag), message, "name a .rou.xml")
     _remove_records(root)
-    problems = [*without_other_stages(path, root), *_refused(path, root), *_invalid_names(path, root)]
-    for parent in [root, *root.iter("interval")]:
-        for element in [each for each in parent if each.tag in _REFUSED]:
-            parent.remove(element)
-    for element in root.iter():
-        for name in _reasons_of(element) | _ONLY.keys():
-            element.attrib.pop(name, None)
-    problems += problems_in(path, root, _supported_kinds(), "root")
+    problems = [*_refused(path, root), *_invalid_names(path, root)] or problems_in(path, root, _KINDS)
     if problems:
         raise UsageError(problems)
 
@@ -91,23 +141,15 @@ def _remove_records(root: ElementTree.Element) -> None:
                 element.remove(param)
 
 
-def _reasons_of(element: ElementTree.Element) -> Mapping[str, Reason]:
-    """The refused attributes of an element, with the reasons."""
-    if element.tag in VEHICLES:
-        return _REFUSED_OF_VEHICLES
-    return _REFUSED_OF_STOPS if element.tag == "stop" else {}
-
-
 def _refused(path: Path, root: ElementTree.Element) -> Iterator[Problem]:
     """A problem for each kind of element and attribute that is refused, with the number of its occurrences."""
     found: Counter[tuple[str, str, str]] = Counter()
     for element in root.iter():
-        if element.tag in _REFUSED:
-            message, remedy = _REFUSED[element.tag]
-            found[element.tag, message, remedy] += 1
-        for name, (message, remedy) in _reasons_of(element).items():
-            if element.get(name) is not None:
-                found[f"{element.tag}.{name}", message, remedy] += 1
+        inside = (f"{element.tag}.{name}" for name in (*element.attrib, *(child.tag for child in element)))
+        for key in (str(element.tag), *inside):
+            if key in _REFUSED:
+                message, remedy = _REFUSED[key]
+                found[key, message, remedy] += 1
         for name, only in _ONLY.items():
             if element.tag in VEHICLES and element.get(name, only[0]) not in only:
                 message = f"{element.get(name, '')[:60]!r} is not supported"
@@ -122,51 +164,3 @@ def _invalid_names(path: Path, root: ElementTree.Element) -> Iterator[Problem]:
         if name and not _NAME.fullmatch(name):
             message = f"{name[:60]!r} can't be a name in SUMO"
             yield Problem(str(path), f"{element.tag}.id", message, "use letters, digits and _")
-
-
-@cache
-def _supported_kinds() -> Mapping[str, ElementKind]:
-    """What the harness reads, and vehicle types, whose attributes SUMO checks."""
-    departs = ("type", "departLane", "departPos", "departSpeed", "departPosLat", "departEdge")
-    arrives = ("arrivalLane", "arrivalPos", "arrivalSpeed", "arrivalEdge", "speedFactor", *_NO_EFFECT["vehicle"])
-    vehicle, between = dict.fromkeys((*departs, *arrives), False), dict.fromkeys(("from", "to", "via"), False)
-    once = {"id": True, "depart": False, **vehicle}
-    routed = {"route": "route within", "routeDistribution": "routes within", "stop": "stop", "param": "param"}
-    route = dict.fromkeys(("repeat", "cycleTime", *_NO_EFFECT["route"]), False)
-    rates = dict.fromkeys(("begin", "end", *FLOW_RATES), False)
-    unused = ("arrival", "routeLength")
-    top = (*VEHICLES, *PEOPLE, "vType", "vTypeDistribution", "route", "routeDistribution", "interval", "busStop")
-    return {
-        "root": ElementKind(children={name: name for name in top}),
-        "vType": ElementKind(None, {"param": "param"}),
-        "vTypeDistribution": ElementKind({"id": True, "vTypes": False, "probabilities": False}, {"vType": "vType"}),
-        "route": ElementKind({"id": True, "edges": True, **route}, {"stop": "stop", "param": "param"}),
-        "route within": ElementKind({"id": False, "edges": True, **route}, {"stop": "stop", "param": "param"}),
-        "route listed": ElementKind(
-            {"id": False, "refId": False, "edges": False, **route}, {"stop": "stop", "param": "param"}
-        ),
-        "routeDistribution": ElementKind(
-            {"id": True, "last": False, "routes": False, "probabilities": False}, {"route": "route listed"}
-        ),
-        "routes within": ElementKind(
-            {"last": False, "routes": False, "probabilities": False}, {"route": "route listed"}
-        ),
-        "vehicle": ElementKind({**once, "route": False, **dict.fromkeys(unused, False)}, routed),
-        "trip": ElementKind({**once, **between}, {"stop": "stop", "param": "param"}),
-        "flow": ElementKind({"id": True, "route": False, **rates, **vehicle, **between}, routed),
-        "interval": ElementKind({"begin": True, "end": True, "id": False}, {"flow": "flow"}),
-        "stop": ElementKind(dict.fromkeys((*STOP_ATTRIBUTES, *_NO_EFFECT["stop"]), False), {"param": "param"}),
-        "busStop": ElementKind(
-            {
-                "id": True,
-                "lane": True,
-                "startPos": False,
-                "endPos": False,
-                **dict.fromkeys(_NO_EFFECT["busStop"], False),
-            },
-            {"param": "param", "access": "access"},
-        ),
-        "access": ElementKind(dict.fromkeys(("lane", "pos", "length", "friendlyPos"), False)),
-        "param": PARAM,
-        **kinds_of_people(),
-    }

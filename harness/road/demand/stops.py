@@ -13,7 +13,6 @@ from sumolib.net.edge import Edge
 from harness.errors import Problem, UsageError
 from harness.road.xml.xml_file import number_in, seconds_in
 
-STOP_ATTRIBUTES = ("lane", "edge", "busStop", "startPos", "endPos", "friendlyPos", "duration", "until", "parking")
 _SHORTEST_M = 0.2  # SUMO refuses a shorter place
 
 

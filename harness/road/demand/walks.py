@@ -16,8 +16,7 @@ from sumolib.net import Net
 from sumolib.net.edge import Edge
 from sumolib.net.lane import Lane
 
-from harness.road.demand.route_file import Departure
-from harness.road.demand.route_people import PLACES
+from harness.road.demand.route_file import PLACES, Departure
 from harness.road.net.network import lane_line
 from harness.road.xml.xml_file import number_of
 

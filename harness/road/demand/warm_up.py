@@ -11,18 +11,18 @@ from __future__ import annotations
 
 import hashlib
 import importlib.metadata
-import json
 import logging
 import os
 import tempfile
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 import platformdirs
+from pydantic import TypeAdapter
 
 from harness.config.scene import Scene
 from harness.errors import SimulationError, UsageError
@@ -30,7 +30,6 @@ from harness.files import write_atomically
 from harness.game.seeding import between, generator_of, seed_of
 from harness.road.demand.route_file import Departure, Motion, RouteFile
 from harness.road.demand.route_writing import traveller_element
-from harness.road.demand.stops import Stop
 from harness.road.xml.angles import heading_rad_of
 from harness.road.xml.sumo_program import run_program
 from harness.road.xml.xml_file import parse_xml
@@ -51,6 +50,9 @@ class Snapshot:
     vehicles: tuple[Departure, ...]
 
 
+_CONTENT = TypeAdapter(tuple[Snapshot, ...])
+
+
 def snapshots(document: Scene, routes: RouteFile, net_file: Path) -> tuple[Snapshot, ...]:
     """The snapshots of a scene, from the cache if it has them. Raises SimulationError if SUMO fails."""
     players = set(document.vehicles)
@@ -60,22 +62,17 @@ def snapshots(document: Scene, routes: RouteFile, net_file: Path) -> tuple[Snaps
     key = net_file.read_bytes() + repr((version, options, routes.types_xml, drawn)).encode()
     cache = Path(platformdirs.user_cache_dir("harness")) / "warm-up" / f"{hashlib.sha256(key).hexdigest()[:24]}.json"
     if cache.exists():
-        return tuple(map(_from_json, json.loads(cache.read_text(encoding="utf-8"))))
+        return _CONTENT.validate_json(cache.read_bytes())
     done: list[Snapshot] = []
+    run = partial(_run, routes=routes, net_file=net_file.resolve(), options=options)
     with ThreadPoolExecutor(os.cpu_count() or 1) as threads:
-        for density, vehicles in zip(
-            (density for density, _ in drawn),
-            threads.map(
-                lambda k: _run(drawn[k][1], k, routes=routes, net_file=net_file.resolve(), options=options),
-                range(SNAPSHOTS),
-            ),
-            strict=True,
-        ):
-            done.append(Snapshot(density=density, vehicles=tuple(vehicles)))
+        vehicles = threads.map(run, (departures for _, departures in drawn), range(SNAPSHOTS))
+        for (density, _), on_road in zip(drawn, vehicles, strict=True):
+            done.append(Snapshot(density=density, vehicles=tuple(on_road)))
             extra = {"done": len(done), "total": SNAPSHOTS}
             _LOGGER.info("warming up the background traffic, once per scene", extra=extra)
     cache.parent.mkdir(parents=True, exist_ok=True)
-    write_atomically(cache, json.dumps([asdict(each) for each in done]).encode())
+    write_atomically(cache, _CONTENT.dump_json(tuple(done)))
     return tuple(done)
 
 
@@ -203,13 +200,3 @@ def _motion(moving: ElementTree.Element, departure: Departure, routes: RouteFile
         length_m=kind.length_m,
         width_m=kind.width_m,
     )
-
-
-def _from_json(content: Mapping[str, Any]) -> Snapshot:
-    return Snapshot(density=content["density"], vehicles=tuple(map(_departure_from_json, content["vehicles"])))
-
-
-def _departure_from_json(content: Mapping[str, Any]) -> Departure:
-    several = {name: tuple(content[name]) for name in ("edges", "arrival", "trip")}
-    stops = tuple(Stop(**stop) for stop in content["stops"])
-    return Departure(**{**content, **several, "stops": stops, "choices": (), "motion": Motion(**content["motion"])})

@@ -6,6 +6,7 @@ SUMO does not validate the numbers of a net, and invalid ones may crash it (SIGS
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from graphlib import CycleError, TopologicalSorter
 from itertools import chain, islice
 from pathlib import Path
 from xml.etree import ElementTree
@@ -15,7 +16,7 @@ import numpy as np
 from harness.config.toml_reading import nearest
 from harness.errors import Problem, UsageError
 from harness.game.arrays import FloatArray
-from harness.road.xml.element_kinds import PARAM, ElementKind, problems_in
+from harness.road.xml.element_kinds import ElementKind, problems_in
 from harness.road.xml.xml_file import number_of, parse_xml
 
 _REMEDY = "build it with netconvert or netedit"
@@ -35,16 +36,8 @@ _CHILDREN = {
     "junction": "request",
     "connection": "conflict",
 }
-_LEAVES = {child for children in _CHILDREN.values() for child in children.split()} - _CHILDREN.keys()
-_KINDS = {
-    "param": PARAM,
-    **dict.fromkeys(_LEAVES, ElementKind(None, {"param": "param"})),
-    **{
-        tag: ElementKind(None, {child: child for child in (*children.split(), "param")})
-        for tag, children in _CHILDREN.items()
-    },
-}
-"""The elements of a net that SUMO and the harness read, by the element around them."""
+_KINDS = {tag: ElementKind((*children.split(), "param")) for tag, children in _CHILDREN.items()}
+"""The elements of a net that SUMO and the harness read. All others have params only."""
 
 
 def check_net(path: Path) -> None:
@@ -52,8 +45,7 @@ def check_net(path: Path) -> None:
     root = parse_xml(path)
     if root.tag != "net":
         raise UsageError.of(path, str(root.tag), "is not a SUMO net: its root is not net", _REMEDY)
-    unknown = list(problems_in(path, root, _KINDS, "net"))
-    if unknown:
+    if unknown := problems_in(path, root, _KINDS):
         raise UsageError(unknown)
     faults = chain(_number_faults(root), _reference_faults(root), _signal_faults(root))
     problems = [Problem(str(path), key, message, _REMEDY) for key, message in islice(faults, _MOST_PROBLEMS)]
@@ -125,11 +117,12 @@ def _reference_faults(root: ElementTree.Element) -> Iterator[tuple[str, str]]:
         via = link.get("via")
         if via and via not in known:
             yield f"{key}.via", f"there is no lane {via!r}; {nearest(via, known or ['(there is no lane)'])}"
-        if via:
+        if via and link.get("from", "").startswith(":"):
             following.setdefault(f"{link.get('from')}_{link.get('fromLane')}", []).append(via)
-    for first in following:
-        if first.startswith(":") and _returns(first, following):
-            yield f"lane {first}", "leads back to itself inside a junction"
+    try:
+        TopologicalSorter(following).prepare()
+    except CycleError as error:
+        yield f"lane {error.args[1][0]}", "leads back to itself inside a junction"
 
 
 def _signal_faults(root: ElementTree.Element) -> Iterator[tuple[str, str]]:
@@ -155,19 +148,6 @@ def _signal_faults(root: ElementTree.Element) -> Iterator[tuple[str, str]]:
             named.add(light)
             message = f"a connection has link {index:g}, a phase has {shortest[light]} states"
             yield f"tlLogic {light}", message
-
-
-def _returns(first: str, following: dict[str, list[str]]) -> bool:
-    """Whether a lane inside a junction leads back to itself."""
-    seen, waiting = set(), list(following[first])
-    while waiting:
-        lane = waiting.pop()
-        if lane == first:
-            return True
-        if lane not in seen and lane.startswith(":"):
-            seen.add(lane)
-            waiting += following.get(lane, [])
-    return False
 
 
 def _points(shape: str) -> FloatArray | None:

@@ -76,8 +76,6 @@ def with_walkers_conflicts(
     right_of_way: RightOfWay, net: Net, routes: Sequence[Route], ways: Sequence[WalkersWay]
 ) -> RightOfWay:
     """The table with the conflicts of players on foot added; `routes` [P] are those of all players."""
-    if not ways:
-        return right_of_way
     conflicts, streams = right_of_way.conflicts, right_of_way.streams
     rows = [dict(zip(Conflicts._fields, row, strict=True)) for row in zip(*conflicts, strict=True)]
     lines = list(zip(*right_of_way.stop_lines, strict=True))

@@ -21,7 +21,8 @@ from harness.road.net import surface
 from harness.road.net.network import lane_line
 from harness.road.net.route_table import extended, road_edges, sampled
 from harness.road.net.stream import USERS
-from harness.road.net.zebra import follows_crossing
+from harness.road.net.walker_conflicts import WalkersWay, ways_of
+from harness.road.net.zebra import follows_crossing, stripes
 from harness.road.scene.open_player import OpenPlayer
 from harness.road.scene.scene_files import SceneFiles
 
@@ -42,6 +43,12 @@ class Ground:
     """[4] bounds of the surroundings of the ways: least x and y, greatest x and y."""
     rail_lines: tuple[FloatArray, ...]
     """The edges of the surface as polylines [n, 2]."""
+    ways: list[WalkersWay]
+
+    @property
+    def stripes(self) -> tuple[FloatArray, ...]:
+        """[5, 2] each: the stripes of the marked crossings, for drawings."""
+        return tuple(stripes([np.array(way.line.coords) for way in self.ways if way.marked], self.carriageway))
 
     @cached_property
     def raster(self) -> Raster:
@@ -56,24 +63,19 @@ class Ground:
 def opened_ground(document: Scene, net: Net, carriageway: BaseGeometry) -> Ground | None:
     """The ground around the ways of a scene's players on foot; None without any. `carriageway` is the net's drivable
     area."""
-    ways = [np.array(player.way, dtype=float) for player in document.players if player.way is not None]
-    lines = [shapely.LineString(way) for way in ways if np.ptp(way, axis=0).any()]
-    if not lines:
+    ways = ways_of(document, net)
+    around = shapely.union_all([way.line for way in ways if way.line.length > 0.0])
+    if around.is_empty:
         return None
-    around = shapely.union_all(lines)
     parts = [each for each in _pavements(net) if each.intersects(around.buffer(MARGIN_M))]
     area = surface.without_slits(surface.joined([carriageway, *parts]))
     return Ground(
         surface=area,
         carriageway=carriageway,
         near_m=np.array(around.buffer(_STRAYS_M).bounds),
-        rail_lines=tuple(_outlines(area)),
+        rail_lines=tuple(shapely.get_coordinates(ring) for ring in shapely.get_rings(shapely.get_parts(area))),
+        ways=ways,
     )
-
-
-def _outlines(area: BaseGeometry) -> list[FloatArray]:
-    outlines = shapely.get_parts(shapely.get_rings(shapely.get_parts(area)))
-    return [shapely.get_coordinates(each) for each in outlines]
 
 
 def _pavements(net: Net) -> list[BaseGeometry]:

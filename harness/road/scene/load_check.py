@@ -11,18 +11,16 @@ import re
 import signal
 import subprocess
 import tempfile
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
-
-import sumo
 
 from harness.config.scene import scene_file
 from harness.errors import Problem, SimulationError, UsageError
 from harness.road.demand.departures import background_departures
 from harness.road.demand.route_writing import traveller_element
 from harness.road.scene.open_scene import OpenScene
+from harness.road.xml.sumo_program import run_program
 
 PATIENCE_S, PATIENCE_S_PER_BYTE = 15.0, 2e-6  # time limit of a program: a constant, and a part per byte of the net
 _INTERVAL_S, _AFTERWARDS_S = 5, 30  # between departures, and after the last one
@@ -40,36 +38,23 @@ def check_loads(scene: OpenScene) -> None:
         types, vehicles = folder / "types.rou.xml", folder / "vehicles.rou.xml"
         types.write_text(scene.routes.types_xml, encoding="utf-8")
         end_s = _write_vehicles(scene, vehicles)
-        process = _spawn(
-            [
-                *("--net-file", str(net), "--route-files", f"{types},{vehicles}", "--end", str(end_s)),
-                *("--step-length", "1", "--collision.action", "none", "--time-to-teleport", "-1"),
-                *("--no-step-log", "--no-warnings"),
-                *("--xml-validation", "always", "--xml-validation.net", "always", "--xml-validation.routes", "always"),
-            ],
-            folder,
-        )
-        try:
-            complaint = _complaint(process, patience_s)
-        finally:
-            process.kill()
-            process.wait()
-            assert process.stderr is not None
-            process.stderr.close()
+        options = [
+            *("--net-file", str(net), "--route-files", f"{types},{vehicles}", "--end", str(end_s)),
+            *("--step-length", "1", "--collision.action", "none", "--time-to-teleport", "-1"),
+            *("--no-step-log", "--no-warnings"),
+            *("--xml-validation", "always", "--xml-validation.net", "always", "--xml-validation.routes", "always"),
+        ]
+        run = run_program("sumo", options, folder, patience_s)
+    complaint = f"SUMO did not finish reading it within {patience_s:.0f} s" if run is None else _complaint(run)
     if complaint:
         about_net = not (str(types) in complaint or str(vehicles) in complaint or _ABOUT_VEHICLES.search(complaint))
         raise UsageError([_problem(complaint, net if about_net else routes, about_net)])
     if scene.document.warm_up_s and scene.has_background_traffic:
-        _check_warm_up(scene)
-
-
-def _check_warm_up(scene: OpenScene) -> None:
-    """Make the warm-up, or find it in the cache. Raises UsageError if SUMO fails in it."""
-    try:
-        _ = scene.warm_up
-    except SimulationError as error:
-        remedy = "correct the route file as SUMO's message says, or choose a shorter warm-up"
-        raise UsageError.of(scene_file(scene.folder), "warm_up_s", str(error), remedy) from None
+        try:
+            _ = scene.warm_up
+        except SimulationError as error:
+            remedy = "correct the route file as SUMO's message says, or choose a shorter warm-up"
+            raise UsageError.of(scene_file(scene.folder), "warm_up_s", str(error), remedy) from None
 
 
 def _write_vehicles(scene: OpenScene, file: Path) -> int:
@@ -86,31 +71,14 @@ def _write_vehicles(scene: OpenScene, file: Path) -> int:
     return _INTERVAL_S * len(kinds) + _AFTERWARDS_S if kinds else 0
 
 
-def _spawn(arguments: Sequence[str], folder: Path) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [Path(sumo.SUMO_HOME) / "bin" / "sumo", *arguments],
-        cwd=folder,
-        env={**os.environ, "SUMO_HOME": sumo.SUMO_HOME},
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-        errors="replace",
-    )
-
-
-def _complaint(process: subprocess.Popen[str], patience_s: float) -> str:
+def _complaint(run: subprocess.CompletedProcess[str]) -> str:
     """The error messages of a program; empty if it ended without error."""
-    try:
-        messages = process.communicate(timeout=patience_s)[1]
-    except subprocess.TimeoutExpired:
-        return f"SUMO did not finish reading it within {patience_s:.0f} s"
-    if process.returncode == -getattr(signal, "SIGXFSZ", 0):  # the disk or its quota is full: not an error of the scene
+    if run.returncode == -getattr(signal, "SIGXFSZ", 0):  # the disk or its quota is full: not an error of the scene
         raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
-    if process.returncode < 0:
-        return f"SUMO died of {signal.Signals(-process.returncode).name} {messages}"
-    errors = [line for line in messages.splitlines() if not line.startswith(("Warning", "Quitting"))]
-    return "\n".join(errors) or f"SUMO ended with exit code {process.returncode}" if process.returncode else ""
+    if run.returncode < 0:
+        return f"SUMO died of {signal.Signals(-run.returncode).name} {run.stderr}"
+    errors = [line for line in run.stderr.splitlines() if not line.startswith(("Warning", "Quitting"))]
+    return "\n".join(errors) or f"SUMO ended with exit code {run.returncode}" if run.returncode else ""
 
 
 def _problem(complaint: str, file: Path, about_net: bool) -> Problem:

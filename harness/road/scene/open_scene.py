@@ -22,12 +22,12 @@ from harness.road.demand.route_file import Departure, RouteFile
 from harness.road.demand.warm_up import Snapshot, snapshots
 from harness.road.net import network
 from harness.road.net.levels import heights_of_players_roads
-from harness.road.net.zebra import stripes
 from harness.road.scene.blocked_lanes import LaneStrip, strips_near
-from harness.road.scene.open_obstacles import with_types
-from harness.road.scene.scene_files import SceneFiles, read_scene
-from harness.road.scene.scene_world import SceneWorld, world_of
-from harness.road.scene.start_overlaps import check_clear_starts, check_starts, start_warnings
+from harness.road.scene.footway import opened_ground
+from harness.road.scene.open_obstacles import open_obstacles, with_types
+from harness.road.scene.scene_files import read_scene
+from harness.road.scene.scene_world import edges_of_players, opened_players, start_places, world_of
+from harness.road.scene.start_overlaps import check_starts, start_warnings
 from harness.shipped_documents import named_document
 
 
@@ -148,33 +148,29 @@ def open_scene(folder: str | Path, ego_type: str | None = None) -> OpenScene:
     """
     folder = named_document(folder, "networks") if isinstance(folder, str) else folder
     files = read_scene(folder, ego_type)
-    found = world_of(files)
-    scene = _recorded(files, found)
-    check_starts(files.file, scene.usual_starts, scene.world)
-    check_clear_starts(files.file, scene.usual_starts, scene.world)
-    return scene
-
-
-def _recorded(files: SceneFiles, found: SceneWorld) -> OpenScene:
-    """The scene as games need it: without the objects of its net."""
-    net, vehicles = files.net, set(files.document.vehicles)
-    background = {name for each in background_departures(files.routes, vehicles) for name in each.edges}
-    edges = [
-        *found.own,
-        *(net.getEdge(name) for name in sorted(background)),
-    ]  # background traffic needs its whole routes
-    crossings = [np.array(way.line.coords) for way in found.ways if way.marked]
-    return OpenScene(
+    document, net = files.document, files.net
+    own = edges_of_players(files)
+    area = network.drivable_area(net, own)
+    ground = opened_ground(document, net, area)
+    players = opened_players(files, own, area, ground)
+    places = start_places(files, players)
+    obstacles = open_obstacles(files, area, [player.route for player in players])
+    rail_lines = tuple(network.rail_lines(net, area, own))
+    background = {name for each in background_departures(files.routes, document.vehicles) for name in each.edges}
+    used = [*own, *map(net.getEdge, sorted(background))]  # background traffic needs its whole routes
+    scene = OpenScene(
         folder=files.folder,
-        document=files.document,
-        world=found.world,
-        routes=with_types(files.routes, found.obstacles),
-        obstacles=found.obstacles,
-        lane_strips=strips_near(net, edges, found.obstacles),
-        places=found.places,
-        edges=tuple(player.edges for player in found.players),
-        rail_lines=found.rail_lines,
-        junctions=network.junctions_near(net, edges),
-        stripes=tuple(stripes(crossings, found.area)),
-        roads_m=heights_of_players_roads(net, found.own),
+        document=document,
+        world=world_of(files, players, rail_lines=rail_lines, ground=ground, obstacles=obstacles),
+        routes=with_types(files.routes, obstacles),
+        obstacles=obstacles,
+        lane_strips=strips_near(net, used, obstacles),
+        places=places,
+        edges=tuple(player.edges for player in players),
+        rail_lines=rail_lines,
+        junctions=network.junctions_near(net, used),
+        stripes=() if ground is None else ground.stripes,
+        roads_m=heights_of_players_roads(net, own),
     )
+    check_starts(files.file, scene.usual_starts, scene.world)
+    return scene

@@ -6,9 +6,10 @@ device of a vehicle type. What SUMO's schemas say beyond that, SUMO checks itsel
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterator, Mapping
+from itertools import islice
 from pathlib import Path
+from typing import NamedTuple
 from xml.etree import ElementTree
 
 from sumolib.net.lane import SUMO_VEHICLE_CLASSES
@@ -18,48 +19,40 @@ from harness.errors import Problem
 
 _MOST_PROBLEMS = 20
 _FILE_KEYS = ("file", "output", "device", "has.")  # parts of a param's key that make SUMO read or write files
-CLASSES = {*SUMO_VEHICLE_CLASSES, "all", "ignoring", "drone", "aircraft"}  # vehicle classes
+_CLASSES = {*SUMO_VEHICLE_CLASSES, "all", "ignoring", "drone", "aircraft"}  # vehicle classes
 _CLASS_ATTRIBUTES = ("allow", "disallow", "prefer", "vClass")
 
 
-@dataclass(frozen=True)
-class ElementKind:
-    """The content of an element: its attributes (True: required; None: left to SUMO), and the kind of each child by its
-    tag."""
+class ElementKind(NamedTuple):
+    """The tags of the children of an element, and the names of its attributes (None: left to SUMO)."""
 
-    attributes: Mapping[str, bool] | None = field(default_factory=dict)
-    children: Mapping[str, str] = field(default_factory=dict)
+    children: Collection[str] = ("param",)
+    attributes: Collection[str] | None = None
 
 
-PARAM = ElementKind({"key": True, "value": False})
+_PARAM = ElementKind((), ("key", "value"))
 
 
-def problems_in(
-    path: Path, root: ElementTree.Element, known: Mapping[str, ElementKind], kind: str
-) -> Iterator[Problem]:
-    """The first problems with the names of an element of this kind and of its descendants."""
-    for count, problem in enumerate(_problems(str(path), root, known, kind=kind, where=root.tag)):
-        if count == _MOST_PROBLEMS:
-            return
-        yield problem
+def problems_in(path: Path, root: ElementTree.Element, known: Mapping[str, ElementKind]) -> list[Problem]:
+    """The first problems with the names of an element and of its descendants.
+
+    `known` has the kinds of elements by their tags. All others may have params only.
+    """
+    return list(islice(_problems(str(path), root, {"param": _PARAM, **known}, where=root.tag), _MOST_PROBLEMS))
 
 
 def _problems(
-    path: str, element: ElementTree.Element, known: Mapping[str, ElementKind], *, kind: str, where: str
+    path: str, element: ElementTree.Element, known: Mapping[str, ElementKind], *, where: str
 ) -> Iterator[Problem]:
-    allowed = known.get(kind, ElementKind())
-    attributes = allowed.attributes or {}
-    for name in element.attrib if allowed.attributes is not None else ():
-        if name not in attributes and not name.startswith("{http://www.w3.org/2001/XMLSchema-instance}"):
-            yield Problem(path, where, f"unknown attribute {name!r}", _nearest(name, attributes))
-    for name, required in attributes.items():
-        if required and name not in element.attrib:
-            yield Problem(path, where, f"has no {name!r}", f"give every {element.tag} its {name}")
+    children, attributes = known.get(element.tag, ElementKind())
+    for name in element.attrib if attributes is not None else ():
+        if name not in (attributes or ()) and not name.startswith("{http://www.w3.org/2001/XMLSchema-instance}"):
+            yield Problem(path, where, f"unknown attribute {name!r}", _nearest(name, attributes or ()))
     for name in _CLASS_ATTRIBUTES:
         for each in element.get(name, "").split():
-            if each not in CLASSES:
+            if each not in _CLASSES:
                 message = f"SUMO has no vehicle class {each[:60]!r}"
-                yield Problem(path, f"{where}.{name}", message, nearest(each, CLASSES))
+                yield Problem(path, f"{where}.{name}", message, nearest(each, _CLASSES))
     if element.tag == "param" and any(part in element.get("key", "").lower() for part in _FILE_KEYS):
         message = f"a param {element.get('key')!r} makes SUMO read or write other files"
         yield Problem(path, where, message, "leave it out: the harness records every game itself")
@@ -67,11 +60,11 @@ def _problems(
         inner = f"{child.tag} {child.get('id')}" if child.get("id") else str(child.tag)
         if " " in where and not child.get("id"):
             inner = f"{where}.{child.tag}"
-        if not isinstance(child.tag, str) or child.tag not in allowed.children:
-            yield Problem(path, str(child.tag), "is not understood here", _nearest(str(child.tag), allowed.children))
+        if child.tag not in children:
+            yield Problem(path, str(child.tag), "is not understood here", _nearest(str(child.tag), children))
         else:
-            yield from _problems(path, child, known, kind=allowed.children[child.tag], where=inner)
+            yield from _problems(path, child, known, where=inner)
 
 
-def _nearest(name: str, valid: Mapping[str, object]) -> str:
+def _nearest(name: str, valid: Collection[str]) -> str:
     return nearest(name, valid) if valid else "leave it out"

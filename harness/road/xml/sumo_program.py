@@ -20,6 +20,7 @@ def run_program(
             [str(Path(sumo.SUMO_HOME) / "bin" / name), *options],
             cwd=folder,
             env=environment,
+            stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
             errors="replace",

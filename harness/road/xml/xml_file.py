@@ -5,10 +5,13 @@ A file whose name ends with `.gz` is compressed with gzip.
 
 from __future__ import annotations
 
+import errno
+import gzip
+import io
 import math
 import re
 import zlib
-from math import inf, isfinite
+from math import inf
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -19,11 +22,11 @@ from harness.config.toml_reading import nearest
 from harness.errors import UsageError
 from harness.files import content_of
 
-_MOST_BYTES = 200_000_000
+MOST_BYTES = 200_000_000
+"""Of a file of SUMO, unpacked."""
 _REMEDY = "open it in netedit and save it again"
 _ENCODING = re.compile(r"""^<\?xml[^>]*?encoding\s*=\s*["']([^"']*)["']""")
 _SCHEMA = re.compile(r"https?://((www\.)?sumo-sim\.org|sumo\.dlr\.de|sumo\.(sf|sourceforge)\.net)/xsd/\w+\.xsd")
-_GZIP = 16 + zlib.MAX_WBITS  # zlib's code for gzip's header
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 _XSI = "{http://www.w3.org/2001/XMLSchema-instance}"
 
@@ -36,7 +39,8 @@ def parse_xml(path: Path) -> ElementTree.Element:
         siblings = [each.name for each in path.parent.glob("*.xml*")] or ["(no XML file in the folder)"]
         raise UsageError.of(path, "", "there is no such file", nearest(path.name, siblings)) from None
     except OSError as error:
-        raise UsageError.of(path, "", f"is not readable XML: {error.strerror}", _REMEDY) from None
+        remedy = "name a plain file, or cut out the part that the scene needs"
+        raise UsageError.of(path, "", f"is not readable XML: {error.strerror}", remedy) from None
     try:
         # SUMO's parser and this one must read the same text: in other encodings they may differ
         text = content.decode("utf-8-sig")
@@ -55,29 +59,24 @@ def parse_xml(path: Path) -> ElementTree.Element:
     return root
 
 
-def xml_bytes(path: Path) -> bytes:
-    """The content of a file, unpacked if its name ends with `.gz`: sumolib goes by the name, too.
+def xml_bytes(path: Path, most_bytes: int = MOST_BYTES) -> bytes:
+    """The content of a file, unpacked if its name ends with `.gz`.
 
     Raises OSError for anything but a plain file of limited size, UsageError for one that is not valid gzip.
     """
-    content = content_of(path, _MOST_BYTES)
-    if path.suffix != ".gz":
+    content = content_of(path, most_bytes)
+    if path.suffix.lower() != ".gz":
         return content
-    parts: list[bytes] = []
-    while content:  # SUMO writes files of several gzip members
-        unpacking = zlib.decompressobj(_GZIP)
-        room = _MOST_BYTES - sum(map(len, parts))
-        try:
-            parts.append(unpacking.decompress(content, room + 1))
-        except zlib.error as error:
-            raise UsageError.of(path, "", f"is not a gzip file: {error}", "compress it again, or remove .gz") from None
-        if len(parts[-1]) > room:
-            message = f"holds more than {_MOST_BYTES / 1e6:,.0f} MB"
-            raise UsageError.of(path, "", message, "cut out the part that the scene needs")
-        if not unpacking.eof:
-            raise UsageError.of(path, "", "is cut off: its gzip data has no end", "compress it again")
-        content = unpacking.unused_data
-    return b"".join(parts)
+    try:
+        with gzip.GzipFile(fileobj=io.BytesIO(content)) as file:
+            content = file.read(most_bytes + 1)
+    except EOFError:
+        raise UsageError.of(path, "", "is cut off: its gzip data has no end", "compress it again") from None
+    except (gzip.BadGzipFile, zlib.error) as error:
+        raise UsageError.of(path, "", f"is not a gzip file: {error}", "compress it again, or remove .gz") from None
+    if len(content) > most_bytes:
+        raise OSError(errno.EFBIG, f"holds more than {most_bytes / 1e6:,.0f} MB", str(path))
+    return content
 
 
 def _check_schema_names(path: Path, root: ElementTree.Element) -> None:
@@ -120,9 +119,9 @@ def number_in(
         return None
     number = number_of(value)
     if not above < number <= most:
-        raise UsageError.of(
-            path, f"{where}.{name}", f"{value[:60]!r} is not a number that is possible here", _hint(most)
-        )
+        message = f"{value[:60]!r} is not a number that is possible here"
+        hint = "give a number of seconds, metres or m/s" + (f", up to {most:g}" if most < inf else "")
+        raise UsageError.of(path, f"{where}.{name}", message, hint)
     return number
 
 
@@ -144,7 +143,3 @@ def seconds_in(path: Path, where: str, element: ElementTree.Element, name: str) 
         message = f"{value[:60]!r} is not a number that is possible here"
         raise UsageError.of(path, f"{where}.{name}", message, f"give a time in seconds, up to {LATEST_S:g}, or h:m:s")
     return number
-
-
-def _hint(most: float) -> str:
-    return "give a number of seconds, metres or m/s" + (f", up to {most:g}" if isfinite(most) else "")
