@@ -21,10 +21,10 @@ from sumolib.net.node import Node
 
 from harness.game.arrays import FloatArray
 from harness.maps.net_conflicts import Priority, foe_pairs, in_order, place_of
-from harness.road.net.network import car_lanes, lane_line
+from harness.road.net.network import car_lanes, is_for_cars, lane_line
 from harness.road.net.right_of_way_table import overlap_of
 from harness.road.net.route_table import line_over_junction
-from harness.road.net.stream import TURNAROUNDS, Feeders, Stream
+from harness.road.net.stream import Feeders, Stream
 
 _OPPOSITE = -0.7  # cosine of the angle between two approaches that come towards each other
 _STRAIGHT = 0.87  # of the angle by which a way over a junction turns
@@ -101,13 +101,7 @@ def candidates(net: Net) -> list[Candidate]:
 def for_cars(links: Iterable[Connection]) -> list[Connection]:
     """The connections that cars may use, without turnarounds."""
     return [
-        link
-        for link in links
-        if link.getDirection() not in TURNAROUNDS
-        and link.getFromLane().allows("passenger")
-        and link.getToLane().allows("passenger")
-        and not link.getFrom().isSpecial()
-        and not link.getTo().isSpecial()
+        link for link in links if is_for_cars(link) and not link.getFrom().isSpecial() and not link.getTo().isSpecial()
     ]
 
 
@@ -221,15 +215,14 @@ def following(net: Net) -> Iterator[Candidate]:
 
 def _into(link: Connection) -> FloatArray:
     """[2] the unit direction in which a connection enters its junction."""
-    line = lane_line(link.getFromLane())
-    return _unit(line[-1] - line[-2])
+    return _direction(lane_line(link.getFromLane())[-2:])
 
 
 def _out(link: Connection) -> FloatArray:
     """[2] the unit direction in which it leaves the junction."""
-    line = lane_line(link.getToLane())
-    return _unit(line[1] - line[0])
+    return _direction(lane_line(link.getToLane())[:2])
 
 
-def _unit(vector: FloatArray) -> FloatArray:
+def _direction(segment: FloatArray) -> FloatArray:
+    vector = segment[1] - segment[0]
     return np.asarray(vector / max(float(np.hypot(*vector)), 1e-9))

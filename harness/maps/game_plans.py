@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 import shapely
@@ -13,8 +14,7 @@ from sumolib.net import Net
 from harness.game.arrays import FloatArray
 from harness.game.road import SPACING_M
 from harness.maps.candidates import Candidate, CandidateKind, LaneWay, candidates, following
-from harness.maps.footways import way_over
-from harness.maps.planned_routes import PlannedRoute, following_m, meeting_near, planned_route, sampled_to
+from harness.maps.planned_routes import PlannedRoute, following_m, meeting_near, planned_route, sampled_to, way_over
 from harness.road.net.meeting import meeting_of_lines
 
 Range = tuple[float, float]
@@ -23,6 +23,7 @@ _SHARES = (0.65, 0.95)  # of the speed limit, at the start
 _SLOWER = (1.0, 0.8, 0.65, 0.5)
 _SLOWEST_MPS = 4.0
 _SECONDS = (6.5, 5.5, 5.0, 4.5, 4.0)  # from the farthest start of the ego to the place, at its highest speed
+_TRIES = tuple(product(_SLOWER, _SECONDS))  # the best first
 _START_RANGE_S = 1.5
 _APART_S = 1.5  # between the arrivals, at most
 _WALK_MPS, _WALK_APART_S = (1.0, 1.4), 2.0
@@ -52,13 +53,13 @@ class Start:
 class GamePlan:
     """Routes and starts of both players of a game at a candidate."""
 
-    number: int
     candidate: Candidate
     ego_route: PlannedRoute
     ego: Start
     person: Start
     person_route: PlannedRoute | None = None
     way: FloatArray | None = None  # [n, 2] of a person on foot
+    number: int = 0
 
     @property
     def way_points(self) -> list[list[float]]:
@@ -103,15 +104,15 @@ class Plans:
         reasons: dict[str, str] = {}  # the first of each with its example
         for group in (candidates, following):
             for candidate in group(self.net) if not found else ():
-                plan = self._plan(candidate, len(found) + 1)
+                plan = self._plan(candidate)
                 if isinstance(plan, GamePlan):
-                    found.append(plan)
+                    found.append(replace(plan, number=len(found) + 1))
                 else:
                     reason = reasons.setdefault(plan.partition(_EXAMPLE)[0], plan)
                     self.left_out[reason] = self.left_out.get(reason, 0) + 1
         return found
 
-    def _plan(self, candidate: Candidate, number: int) -> GamePlan | str:
+    def _plan(self, candidate: Candidate) -> GamePlan | str:
         """The plan of a candidate, or the reason why it has none."""
         ways = [way for way in (candidate.first, candidate.second) if way is not None]
         if narrow := _narrow(ways):
@@ -120,18 +121,21 @@ class Plans:
         if ego_route is None:
             return "no room for a goal behind it"
         if candidate.second is None:
-            return self._on_foot(candidate, number, ego_route)
+            return self._on_foot(candidate, ego_route)
         if candidate.kind is CandidateKind.FOLLOWING:
-            return _one_behind_the_other(candidate, number, ego_route)
+            return _one_behind_the_other(candidate, ego_route)
         route = self._route(candidate.second)
         if route is None:
             return "no room for a goal behind it"
         if candidate.first.start.getEdge() is candidate.second.start.getEdge():
-            merging = self._from_the_same_edge(candidate, number, ego_route, route)
-            return merging or "too little road before it"
-        return _timed(candidate, number, ego_route=ego_route, route=route, within_m=_NEAR_M) or self._shorter(
-            candidate, number
-        )
+            return self._from_the_same_edge(candidate, ego_route, route) or "too little road before it"
+        for before_m in (None, 80.0, 40.0):  # longer routes may meet before the place
+            routes = [self._route(way, before_m) for way in (candidate.first, candidate.second)]
+            if routes[0] is not None and routes[1] is not None:
+                plan = _timed(candidate, ego_route=routes[0], route=routes[1], within_m=_NEAR_M)
+                if plan is not None:
+                    return plan
+        return "too little road before it"
 
     def _route(self, way: LaneWay, before_m: float | None = None) -> PlannedRoute | None:
         """The route over a way, with so much road before its junction that a game can start at speed."""
@@ -141,25 +145,14 @@ class Plans:
             self._routes[key] = planned_route(self.net, way, wanted_m, self._rings)
         return self._routes[key]
 
-    def _shorter(self, candidate: Candidate, number: int) -> GamePlan | str:
-        """The plan with the routes' last metres only: longer ones may meet before the place."""
-        assert candidate.second is not None, "both are cars"
-        for before_m in (80.0, 40.0):
-            routes = [self._route(way, before_m) for way in (candidate.first, candidate.second)]
-            if routes[0] is not None and routes[1] is not None:
-                plan = _timed(candidate, number, ego_route=routes[0], route=routes[1], within_m=_NEAR_M)
-                if plan is not None:
-                    return plan
-        return "too little road before it"
-
     def _from_the_same_edge(
-        self, candidate: Candidate, number: int, ego_route: PlannedRoute, route: PlannedRoute
+        self, candidate: Candidate, ego_route: PlannedRoute, route: PlannedRoute
     ) -> GamePlan | None:
         """Both on one edge, on two lanes that become one: by time if they come from different roads, else abreast."""
         assert candidate.second is not None, "both are cars"
         if ego_route.edges[0] != route.edges[0]:
             length_m = candidate.first.start.getLength()
-            plan = _timed(candidate, number, ego_route=ego_route, route=route, within_m=length_m + _NEAR_M)
+            plan = _timed(candidate, ego_route=ego_route, route=route, within_m=length_m + _NEAR_M)
             if plan is not None:
                 return plan
         lanes, length_m = (candidate.first.start, candidate.second.start), candidate.first.start.getLength()
@@ -168,7 +161,6 @@ class Plans:
             low_m, high_m = length_m - 6.0 * speed[1], length_m - 4.0 * speed[1]
             if low_m - _BESIDE_M >= 1.0:
                 return GamePlan(
-                    number=number,
                     candidate=candidate,
                     ego_route=ego_route,
                     person_route=route,
@@ -189,8 +181,8 @@ class Plans:
                 )
         return None
 
-    def _on_foot(self, candidate: Candidate, number: int, ego_route: PlannedRoute) -> GamePlan | str:
-        for slower, seconds in _tries():
+    def _on_foot(self, candidate: Candidate, ego_route: PlannedRoute) -> GamePlan | str:
+        for slower, seconds in _TRIES:
             speed = _speeds(ego_route.limit_mps, slower)
             most_s = seconds * speed[1] / speed[0] + _WALK_APART_S
             way = way_over(candidate, _WALK_MPS[1] * most_s + 2.0)
@@ -203,27 +195,22 @@ class Plans:
             start = _ego_start(found.ego_m, speed, seconds)
             if start.range[0] >= _FIRST_START_M and found.other_m >= _WALK_MPS[1] * most_s:
                 person = _arriving(_WALK_APART_S, _WALK_MPS, found.other_m - _WALK_MPS[1] * most_s)
-                return GamePlan(
-                    number=number, candidate=candidate, ego_route=ego_route, ego=start, person=person, way=way
-                )
+                return GamePlan(candidate=candidate, ego_route=ego_route, ego=start, person=person, way=way)
         return "too little road or pavement before it"
 
 
-def _timed(
-    candidate: Candidate, number: int, *, ego_route: PlannedRoute, route: PlannedRoute, within_m: float
-) -> GamePlan | None:
+def _timed(candidate: Candidate, *, ego_route: PlannedRoute, route: PlannedRoute, within_m: float) -> GamePlan | None:
     """The plan in which both arrive within `_APART_S` of each other; None if the routes leave no room for it."""
     found = meeting_near(ego_route, route, candidate.place, within_m)
     if found is None:
         return None
-    for slower, seconds in _tries():
+    for slower, seconds in _TRIES:
         speed, other = _speeds(ego_route.limit_mps, slower), _speeds(route.limit_mps, slower)
         start = _ego_start(found.ego_m, speed, seconds)
         most_s = seconds * speed[1] / speed[0] + _APART_S
         first_m = found.other_m - other[1] * most_s
         if min(start.first_m, first_m) >= _FIRST_START_M:
             return GamePlan(
-                number=number,
                 candidate=candidate,
                 ego_route=ego_route,
                 person_route=route,
@@ -233,26 +220,18 @@ def _timed(
     return None
 
 
-def _one_behind_the_other(candidate: Candidate, number: int, route: PlannedRoute) -> GamePlan | str:
+def _one_behind_the_other(candidate: Candidate, route: PlannedRoute) -> GamePlan | str:
     speed = _speeds(route.limit_mps, 1.0)
     length_m, needed_m = len(route.line) * SPACING_M, _LEAST_FOLLOWING * following_m(route.limit_mps)
     if length_m < needed_m:
         return f"too short a road: {length_m:.0f} m of {needed_m:.0f} m"
     return GamePlan(
-        number=number,
         candidate=candidate,
         ego_route=route,
         person_route=route,
         ego=Start(key="route_m", range=(10.0, 30.0), speed_mps=speed, first_m=10.0),
         person=Start(key="route_m", range=(55.0, 75.0), speed_mps=speed, first_m=55.0),
     )
-
-
-def _tries() -> Iterator[tuple[float, float]]:
-    """Factors on the speeds and seconds before the place, the best first."""
-    for slower in _SLOWER:
-        for seconds in _SECONDS:
-            yield slower, seconds
 
 
 def _ego_start(meeting_m: float, speed: Range, seconds: float) -> Start:

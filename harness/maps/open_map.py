@@ -6,16 +6,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from html import unescape
 from pathlib import Path
+from xml.etree import ElementTree
 
 from sumolib.net import Net
 
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray
+from harness.game.junctions import SIGNALS, Signal
 from harness.maps.game_plans import GamePlan, Plans
 from harness.maps.import_map import import_map
-from harness.maps.lights import longest_reds_s
 from harness.road.net.net_listing import ListedJunction, ListedLane, edges_near, listed_junctions, listed_lanes
 from harness.road.net.network import car_lanes, lane_line
+from harness.road.xml.xml_file import number_of, parse_xml
+
+_STOPS = {letter for letter, signal in SIGNALS.items() if signal in (Signal.YELLOW, Signal.RED)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,3 +76,26 @@ def open_map(source: Path, folder: Path, *, left_hand: bool) -> OpenMap:
         left_out=plans.left_out,
         reds_s=longest_reds_s(net_file),
     )
+
+
+def longest_reds_s(net_file: Path) -> dict[str, float]:
+    """The longest time for which a link of each traffic light of a checked net is yellow or red, by the light's id."""
+    reds: dict[str, float] = {}
+    for logic in parse_xml(net_file).findall("tlLogic"):
+        name = logic.get("id", "")
+        reds[name] = max(reds.get(name, 0.0), _longest_s(logic))
+    return reds
+
+
+def _longest_s(logic: ElementTree.Element) -> float:
+    phases = [(number_of(each.get("duration", "")), each.get("state", "")) for each in logic.findall("phase")]
+    longest_s = 0.0
+    for link in range(min(len(state) for _, state in phases)):
+        stops = [(duration_s, state[link] in _STOPS) for duration_s, state in phases]
+        if all(stop for _, stop in stops):
+            continue  # of a direction that is closed
+        since_s = 0.0
+        for duration_s, stop in stops * 2:  # red may go on from the last phase to the first
+            since_s = since_s + duration_s if stop else 0.0
+            longest_s = max(longest_s, since_s)
+    return longest_s

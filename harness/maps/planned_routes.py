@@ -1,4 +1,4 @@
-"""Routes through a candidate: enough road before it for a start at speed, and a goal behind it."""
+"""Routes through a candidate, with enough road for a start at speed and a goal behind it, and ways on foot."""
 
 from __future__ import annotations
 
@@ -7,14 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from shapely.ops import substring
 from sumolib.net import Net
 from sumolib.net.connection import Connection
 from sumolib.net.edge import Edge
+from sumolib.net.lane import Lane
 
 from harness.game.arrays import FloatArray
 from harness.game.road import SPACING_M
-from harness.maps.candidates import LaneWay, for_cars
+from harness.maps.candidates import Candidate, LaneWay, for_cars
 from harness.road.net.meeting import Meeting, meeting_of_lines
+from harness.road.net.network import lane_line
 from harness.road.net.route_table import route_line
 
 BEYOND_M = 45.0  # of the goal behind the junction
@@ -25,6 +28,8 @@ _FOLLOWING_S, _AHEAD_M = 15.0, 75.0  # from the farthest start of the player ahe
 _BEND_COST, _YIELD_COST, _RING_COST = 2.0, 1.0, 3.0
 _SLOWER = 0.9
 _FREE_STATES = "MO"
+_FARTHEST_M = 12.0  # between the end of a crossing and that of a pavement
+_ONTO_M = 1.5  # of the pavement at the end of a way
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,3 +147,38 @@ def _lights(edge: Edge) -> list[str]:
 
 def _onward(edge: Edge) -> list[Connection]:
     return for_cars(link for links in edge.getOutgoing().values() for link in links)
+
+
+def way_over(candidate: Candidate, before_m: float) -> FloatArray | None:
+    """[n, 2] a way that comes from the side nearer to the ego's approach, with up to `before_m` of pavement before the
+    road; None where a side has no pavement."""
+    assert candidate.footway is not None, "only zebra crossings have a footway"
+    ego_end = lane_line(candidate.first.start)[-1]
+    near, far = sorted(candidate.footway, key=lambda point: float(np.hypot(*(point - ego_end))))
+    lanes = _pavements(candidate.first.start.getEdge(), candidate.first.end.getEdge())
+    come, go = _nearest(lanes, near, before_m), _nearest(lanes, far, _ONTO_M)
+    if come is None or go is None:
+        return None
+    return _without_repeats(np.concatenate((come[::-1], [near], [far], go)))
+
+
+def _pavements(*edges: Edge) -> list[Lane]:
+    """The lanes for people on foot alone beside the edges of a junction."""
+    nodes = {edges[0].getToNode(), edges[-1].getFromNode()}
+    around = {edge for node in nodes for edge in (*node.getIncoming(), *node.getOutgoing()) if not edge.isSpecial()}
+    lanes = [lane for edge in sorted(around, key=lambda edge: str(edge.getID())) for lane in edge.getLanes()]
+    return [lane for lane in lanes if lane.allows("pedestrian") and not lane.allows("passenger")]
+
+
+def _nearest(lanes: list[Lane], point: FloatArray, length_m: float) -> FloatArray | None:
+    """[n, 2] the pavement that begins or ends nearest to a point, from there on for up to a length."""
+    lines = [line for lane in lanes for line in (lane_line(lane), lane_line(lane)[::-1])]
+    line = min(lines, key=lambda line: float(np.hypot(*(line[0] - point))), default=None)
+    if line is None or float(np.hypot(*(line[0] - point))) > _FARTHEST_M:
+        return None
+    return shapely.get_coordinates(substring(shapely.LineString(line), 0.5, 0.5 + length_m))
+
+
+def _without_repeats(points: FloatArray) -> FloatArray:
+    apart = np.hypot(*np.diff(points, axis=0).T) > 0.05
+    return points[np.concatenate(([True], apart))]

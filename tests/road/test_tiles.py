@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from pathlib import Path
+from typing import Any
 
 import libsumo
 import platformdirs
@@ -18,39 +19,38 @@ from harness.road.scene.open_scene import OpenScene
 
 
 @pytest.fixture
-def merges(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """The games of each net that netconvert merged, with a cache in a temporary folder."""
-    merges: list[int] = []
-    merge = tiles._merge
+def written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """The games of each net that is written, with a cache in a temporary folder."""
+    games: list[int] = []
 
-    def counted_merge(net_file: Path, games: int, scratch: Path, junctions: Collection[str] | None) -> Path:
-        merges.append(games)
-        return merge(net_file, games, scratch, junctions)
+    def counted(net_file: Path, file: Path, *, prefixes: Collection[str], **options: Any) -> None:
+        games.append(len(prefixes))
+        write_tiles(net_file, file, prefixes=prefixes, **options)
 
     monkeypatch.setattr(platformdirs, "user_cache_dir", lambda name: str(tmp_path / name))
-    monkeypatch.setattr(tiles, "_merge", counted_merge)
-    return merges
+    monkeypatch.setattr(tiles, "write_tiles", counted)
+    return games
 
 
-def test_tiles__of_one_game_are_the_net_itself(merge: OpenScene, merges: list[int]) -> None:
+def test_tiles__of_one_game_are_the_net_itself(merge: OpenScene, written: list[int]) -> None:
     assert tiles.tiled_net(merge.net_file, 1) == merge.net_file
-    assert merges == []
+    assert written == []
 
 
-def test_tiles__are_side_by_side_with_prefixed_names(merge: OpenScene, merges: list[int]) -> None:
+def test_tiles__are_side_by_side_with_prefixed_names(merge: OpenScene, written: list[int]) -> None:
     net, offset_m = readNet(str(tiles.tiled_net(merge.net_file, 2))), tiles.tile_offset_m(merge.net_file, 2)
     lanes = [net.getLane(f"{tiles.tile_prefix(game, 2)}approach_0") for game in range(2)]
     assert lanes[1].getShape()[0][0] == pytest.approx(lanes[0].getShape()[0][0])
     assert lanes[1].getShape()[0][1] - lanes[0].getShape()[0][1] == pytest.approx(offset_m)
 
 
-def test_cache__has_a_net_for_each_number_of_games(merge: OpenScene, merges: list[int]) -> None:
+def test_cache__has_a_net_for_each_number_of_games(merge: OpenScene, written: list[int]) -> None:
     files = [tiles.tiled_net(merge.net_file, games) for games in (2, 3, 2)]
     assert files[0] == files[2] != files[1]
-    assert merges == [2, 3]
+    assert written == [2, 3]
 
 
-def test_cache__has_a_net_for_each_choice_of_junctions(merge: OpenScene, merges: list[int]) -> None:
+def test_cache__has_a_net_for_each_choice_of_junctions(merge: OpenScene, written: list[int]) -> None:
     files = [tiles.tiled_net(merge.net_file, 1, each) for each in ({"start"}, {"finish"}, {"start"})]
     assert files[0] == files[2] != files[1]
     assert merge.net_file not in files

@@ -46,18 +46,10 @@ def times_of(
         skipped, times = _regular_times(first_s, end_s, begin_s, rate.period_s / density)
     elif rate.mean_period_s is not None:
         skipped, times = 0, _random_times(max(first_s, begin_s), end_s, rate.mean_period_s / density, generator)
-    else:
-        skipped, times = (
-            0,
-            _times_by_second(
-                rate.probability_per_s or 0.0,
-                first_s=first_s,
-                end_s=end_s,
-                begin_s=begin_s,
-                density=density,
-                generator=generator,
-            ),
-        )
+    else:  # in each second a vehicle departs with a probability; above 1: one for certain, and more
+        seconds = np.arange(first_s + max(ceil(begin_s - first_s), 0), end_s, 1.0)
+        expected = (rate.probability_per_s or 0.0) * density
+        skipped, times = 0, np.repeat(seconds, np.ceil(expected - generator.random(len(seconds))).astype(int))
     numbered = [(skipped + k, time) for k, time in enumerate(times.tolist())]
     return numbered if number is None else [each for each in numbered if each[0] < number]
 
@@ -78,13 +70,3 @@ def _random_times(begin_s: float, end_s: float, mean_period_s: float, generator:
     while times[-1] < end_s:
         times = np.append(times, times[-1] + np.cumsum(generator.exponential(mean_period_s, 20)))
     return times[times < end_s]
-
-
-def _times_by_second(
-    probability: float, *, first_s: float, end_s: float, begin_s: float, density: float, generator: np.random.Generator
-) -> FloatArray:
-    """In each second a vehicle departs with a probability. A probability above 1 is a vehicle for certain, and more."""
-    first_s += max(ceil(begin_s - first_s), 0)
-    seconds = np.arange(first_s, end_s, 1.0)
-    counts = np.ceil(probability * density - generator.random(len(seconds))).astype(int)
-    return np.repeat(seconds, counts)

@@ -20,7 +20,7 @@ from harness.road.demand.route_file import (
     RouteChoice,
     VehicleType,
 )
-from harness.road.demand.stops import StopPlace, stop_in
+from harness.road.demand.stops import stop_in
 from harness.road.xml.xml_file import number_in, number_of, required
 
 _MOST_EDGES = 10_000
@@ -57,7 +57,7 @@ class NamedRoutes:
     """The routes and route distributions of a file by name, each as the routes to choose from, and its bus stops."""
 
     routes: Mapping[str, tuple[RouteChoice, ...]]
-    places: Mapping[str, StopPlace]
+    bus_stops: Mapping[str, ElementTree.Element]
 
 
 def ranged(path: Path, element: ElementTree.Element, name: str, default: float) -> float:
@@ -90,26 +90,23 @@ def read_types(path: Path, root: ElementTree.Element, problems: list[Problem]) -
 
 def read_routes(path: Path, root: ElementTree.Element, problems: list[Problem]) -> NamedRoutes:
     """The routes, route distributions and bus stops of a file; mistakes are added to `problems`."""
-    places = {
-        element.get("id", ""): place
-        for element in root
-        if element.tag == "busStop"
-        if (place := collect(problems, partial(_place, path, element))) is not None
-    }
+    bus_stops = {element.get("id", ""): element for element in root.findall("busStop")}
+    for element in bus_stops.values():
+        collect(problems, partial(_check_bus_stop, path, element))
     routes: dict[str, tuple[RouteChoice, ...]] = {}
     for element in [*root.findall("route"), *root.findall("routeDistribution/route")]:
         if element.get("id") and element.get("edges") is not None:
-            route = collect(problems, partial(route_in, path, element, places))
+            route = collect(problems, partial(route_in, path, element, bus_stops))
             if route is not None:
                 routes[required(path, element, "id")] = (route,)
     for element in root.findall("routeDistribution"):
-        choices = collect(problems, partial(choices_in, path, element, NamedRoutes(routes, places)))
+        choices = collect(problems, partial(choices_in, path, element, NamedRoutes(routes, bus_stops)))
         if choices is not None:
             routes[required(path, element, "id")] = choices
-    return NamedRoutes(routes, places)
+    return NamedRoutes(routes, bus_stops)
 
 
-def route_in(path: Path, element: ElementTree.Element, places: Mapping[str, StopPlace]) -> RouteChoice:
+def route_in(path: Path, element: ElementTree.Element, bus_stops: Mapping[str, ElementTree.Element]) -> RouteChoice:
     """The route that an element writes out. Raises UsageError."""
     where = f"route {element.get('id')}" if element.get("id") else "route"
     edges = tuple(element.get("edges", "").split())
@@ -117,7 +114,7 @@ def route_in(path: Path, element: ElementTree.Element, places: Mapping[str, Stop
     if len(edges) * passes > _MOST_EDGES:
         message = f"has {len(edges) * passes:,} edges, up to {_MOST_EDGES:,} are possible"
         raise UsageError.of(path, f"{where}.repeat", message, "choose fewer repetitions")
-    stops = tuple(stop_in(path, where, each, places) for each in element.findall("stop"))
+    stops = tuple(stop_in(path, where, each, bus_stops) for each in element.findall("stop"))
     cycle_s = number_in(path, where, element, "cycleTime", above=0.0, most=1e6) or 0.0
     share = _share(path, element)
     return RouteChoice(
@@ -144,7 +141,7 @@ def choices_in(path: Path, element: ElementTree.Element, named: NamedRoutes) -> 
         if child.get("edges") is None:
             choices += listed(child.get("refId", ""), _share(path, child))
         else:
-            choices.append(route_in(path, child, named.places))
+            choices.append(route_in(path, child, named.bus_stops))
     choices = [each for each in choices if each.share > 0.0]
     if not choices:
         raise UsageError.of(path, where, "has no route with a probability above 0", "give it routes")
@@ -201,7 +198,8 @@ def _shares(path: Path, where: str, element: ElementTree.Element, count: int) ->
     return [*shares, *[None] * count][:count]
 
 
-def _place(path: Path, element: ElementTree.Element) -> StopPlace:
+def _check_bus_stop(path: Path, element: ElementTree.Element) -> None:
     where = f"busStop {required(path, element, 'id')}"
-    start, end = (number_in(path, where, element, name) for name in ("startPos", "endPos"))
-    return StopPlace(lane=required(path, element, "lane"), start_m=start, end_m=end)
+    required(path, element, "lane")
+    for name in ("startPos", "endPos"):
+        number_in(path, where, element, name)

@@ -111,7 +111,7 @@ def _departure(path: Path, element: ElementTree.Element, named: NamedRoutes, typ
     choices = tuple(_cut(path, where, element, each) for each in _choices(path, where, element, named))
     if not all(each.edges for each in choices):
         raise UsageError.of(path, where, "its route has no edges", "give the route's edges")
-    stops = tuple(stop_in(path, where, each, named.places) for each in element.findall("stop"))
+    stops = tuple(stop_in(path, where, each, named.bus_stops) for each in element.findall("stop"))
     departure = Departure(
         name=required(path, element, "id"),
         vehicle_type=kind,
@@ -196,7 +196,7 @@ def _choices(path: Path, where: str, element: ElementTree.Element, named: NamedR
     """The routes that a vehicle has or chooses from; none for a trip."""
     own, several, name = element.find("route"), element.find("routeDistribution"), element.get("route")
     if own is not None:
-        return (route_in(path, own, named.places),)
+        return (route_in(path, own, named.bus_stops),)
     if several is not None:
         return choices_in(path, several, named)
     if name is None and element.tag != "vehicle":

@@ -9,12 +9,11 @@ from harness.road.demand.route_file import EDGE_SHARE, SHARE, Departure
 
 def traveller_element(departure: Departure, name: str, depart_s: float) -> ElementTree.Element:
     """A `<vehicle>` with one route, or a `<person>` with one walk, under a name and at a time."""
-    return (_person_element if departure.on_foot else _vehicle_element)(departure, name, depart_s)
-
-
-def _person_element(departure: Departure, name: str, depart_s: float) -> ElementTree.Element:
-    factor = {} if departure.speed_factor is None else {"speedFactor": f"{departure.speed_factor:.6f}"}
-    attributes = {"id": name, "type": departure.vehicle_type, "depart": f"{depart_s:.3f}", **factor}
+    attributes = {"id": name, "type": departure.vehicle_type, "depart": f"{depart_s:.3f}"}
+    if departure.speed_factor is not None:
+        attributes["speedFactor"] = f"{departure.speed_factor:.6f}"
+    if not departure.on_foot:
+        return _vehicle_element(departure, attributes, depart_s - departure.depart_s)
     departs, arrives = (
         "random" if each.endswith(EDGE_SHARE) else each for each in (departure.position, departure.arrival[1])
     )
@@ -24,34 +23,22 @@ def _person_element(departure: Departure, name: str, depart_s: float) -> Element
     return element
 
 
-def _vehicle_element(departure: Departure, name: str, depart_s: float) -> ElementTree.Element:
-    """A `<vehicle>` with one route, under a name and at a time."""
-    arrival_lane, arrival_position, arrival_speed = departure.arrival
-    attributes = {
-        "id": name,
-        "type": departure.vehicle_type,
-        "depart": f"{depart_s:.3f}",
-        "departLane": departure.lane,
-        "departPos": departure.position,
-        "departSpeed": departure.speed,
-        "arrivalLane": arrival_lane,
-        "arrivalPos": arrival_position,
-        "arrivalSpeed": arrival_speed,
-    }
+def _vehicle_element(departure: Departure, attributes: dict[str, str], later_s: float) -> ElementTree.Element:
+    names = ("departLane", "departPos", "departSpeed", "arrivalLane", "arrivalPos", "arrivalSpeed")
+    places = (departure.lane, departure.position, departure.speed, *departure.arrival)
+    attributes |= dict(zip(names, places, strict=True))
     if departure.lateral:
         attributes["departPosLat"] = "random" if departure.lateral.endswith(SHARE) else departure.lateral
-    if departure.speed_factor is not None:
-        attributes["speedFactor"] = f"{departure.speed_factor:.6f}"
     element = ElementTree.Element("vehicle", attributes)
     ElementTree.SubElement(element, "route", edges=" ".join(departure.edges))
     for stop in departure.stops:
-        times = {
+        numbers = {
+            "startPos": stop.start_m,
+            "endPos": stop.end_m,
             "duration": stop.duration_s,
-            "until": None if stop.until_s is None else stop.until_s + depart_s - departure.depart_s,
+            "until": stop.later(later_s).until_s,
         }
-        place = {"startPos": stop.start_m, "endPos": stop.end_m}
-        numbers = {key: f"{value:.3f}" for key, value in {**place, **times}.items() if value is not None}
-        lane = {"lane": f"{stop.edge}_{stop.lane}"}
+        written = {key: f"{value:.3f}" for key, value in numbers.items() if value is not None}
         parking = {"parking": "true"} if stop.parking else {}
-        ElementTree.SubElement(element, "stop", lane | numbers | parking)
+        ElementTree.SubElement(element, "stop", {"lane": f"{stop.edge}_{stop.lane}", **written, **parking})
     return element

@@ -17,15 +17,6 @@ _SHORTEST_M = 0.2  # SUMO refuses a shorter place
 
 
 @dataclass(frozen=True, kw_only=True)
-class StopPlace:
-    """A bus stop of a route file or additional file: part of a lane."""
-
-    lane: str
-    start_m: float | None
-    end_m: float | None
-
-
-@dataclass(frozen=True, kw_only=True)
 class Stop:
     """A stop of a vehicle: on a part of a lane, for a duration or until a time."""
 
@@ -46,7 +37,7 @@ class Stop:
         return self if self.until_s is None else replace(self, until_s=self.until_s + by_s)
 
 
-def stop_in(path: Path, where: str, element: ElementTree.Element, places: Mapping[str, StopPlace]) -> Stop:
+def stop_in(path: Path, where: str, element: ElementTree.Element, bus_stops: Mapping[str, ElementTree.Element]) -> Stop:
     """The stop that an element describes. Raises UsageError, with `where` as its key, if it has no place or no end."""
     duration, until = seconds_in(path, where, element, "duration"), seconds_in(path, where, element, "until")
     if duration is None and until is None:
@@ -54,14 +45,14 @@ def stop_in(path: Path, where: str, element: ElementTree.Element, places: Mappin
     parking = element.get("parking", "false").lower()
     if parking not in ("true", "false", "1", "0"):
         raise UsageError.of(path, f"{where}.parking", f"{parking[:60]!r} is not supported", "write true or false")
-    start, end = (number_in(path, where, element, name) for name in ("startPos", "endPos"))
-    lane, edge, index = element.get("lane", ""), element.get("edge", ""), None
-    if element.get("busStop"):
-        place = places.get(element.get("busStop", ""))
-        if place is None:
-            message = f"names the bus stop {element.get('busStop', '')[:60]!r}, which this file does not define"
+    place = element
+    if name := element.get("busStop"):
+        if name not in bus_stops:
+            message = f"names the bus stop {name[:60]!r}, which this file does not define"
             raise UsageError.of(path, where, message, "give the stop's lane, startPos and endPos instead")
-        lane, start, end = place.lane, place.start_m, place.end_m
+        place = bus_stops[name]
+    start, end = (number_in(path, where, place, name) for name in ("startPos", "endPos"))
+    lane, edge, index = place.get("lane", ""), element.get("edge", ""), None
     if lane:
         edge, _, number = lane.rpartition("_")
         index = int(number) if number.isdecimal() and len(number) < 4 else -1

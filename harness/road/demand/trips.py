@@ -14,6 +14,7 @@ import json
 import tempfile
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -47,17 +48,15 @@ def with_routes(routes: RouteFile, net_file: Path, net: Net, needed: Iterable[De
         if departure.name in names and departure.trip
         for each in routes.variants(departure)
     ]
-    found = _find(routes, net_file, net, trips) if trips else {}
-    routes = replace(routes, found=found)
+    routes = replace(routes, found=_find(routes, net_file, net, trips) if trips else {})
+
+    def settled(each: Departure) -> Departure:
+        return _settled(each, routes, net) if each.name in names else each
+
     return replace(
         routes,
-        vehicles={
-            name: _settled(each, routes, net) if name in names else each for name, each in routes.vehicles.items()
-        },
-        flows=tuple(
-            replace(flow, departure=_settled(flow.departure, routes, net)) if flow.departure.name in names else flow
-            for flow in routes.flows
-        ),
+        vehicles={name: settled(each) for name, each in routes.vehicles.items()},
+        flows=tuple(replace(flow, departure=settled(flow.departure)) for flow in routes.flows),
     )
 
 
@@ -83,34 +82,27 @@ def _find(
     routes: RouteFile, net_file: Path, net: Net, trips: Sequence[Departure]
 ) -> dict[tuple[str, tuple[str, ...]], tuple[str, ...]]:
     problems: list[Problem] = []
-    known: set[str] = set()
     queries: dict[tuple[str, tuple[str, ...]], _Query] = {}
     for trip in trips:
-        key = f"trip {trip.name}"
-        for edge in trip.trip:
-            if edge not in known and collect(problems, lambda: _check_edge(net, routes.path, key, edge)):  # noqa: B023
-                known.add(edge)
+        for edge in dict.fromkeys(trip.trip):
+            collect(problems, partial(network.find_edge, net, routes.path, f"trip {trip.name}", edge))
         kind = routes.types[trip.vehicle_type]
         walk, drive = (_ON_FOOT, "0"), (kind.vehicle_class, f"{kind.max_speed_mps:g}")
         queries[kind.name, trip.trip] = (*(walk if trip.on_foot else drive), trip.trip)
+        if len(problems) >= MOST_PROBLEMS:
+            break
     if problems:
-        raise UsageError(sorted(set(problems))[:MOST_PROBLEMS])
+        raise UsageError(sorted(set(problems)))
     answers = _answers(net_file, routes.path, sorted(set(queries.values())))
     for trip in trips:
         vehicle_class, _, places = query = queries[trip.vehicle_type, trip.trip]
         if query not in answers:
-            message = (
-                f"no route for a {vehicle_class} leads from {' over '.join(map(repr, places[:-1]))} to {places[-1]!r}"
-            )
+            way = f"from {' over '.join(map(repr, places[:-1]))} to {places[-1]!r}"
+            message = f"no route for a {vehicle_class} leads {way}"
             problems.append(Problem(str(routes.path), f"trip {trip.name}", message, "correct its edges or its type"))
     if problems:
         raise UsageError(sorted(set(problems))[:MOST_PROBLEMS])
     return {key: answers[query] for key, query in queries.items()}
-
-
-def _check_edge(net: Net, path: Path, key: str, edge: str) -> bool:
-    network.find_edge(net, path, key, edge)
-    return True
 
 
 def _answers(net_file: Path, route_path: Path, queries: Sequence[_Query]) -> dict[_Query, tuple[str, ...]]:
@@ -132,9 +124,8 @@ def _run_duarouter(net_file: Path, route_path: Path, queries: Sequence[_Query]) 
     root = ElementTree.Element("routes")
     kinds = {each[:2]: f"t{k}" for k, each in enumerate(dict.fromkeys(query[:2] for query in queries))}
     for (vehicle_class, speed), name in kinds.items():
-        if vehicle_class == _ON_FOOT:
-            continue
-        ElementTree.SubElement(root, "vType", id=name, vClass=vehicle_class, maxSpeed=speed)
+        if vehicle_class != _ON_FOOT:
+            ElementTree.SubElement(root, "vType", id=name, vClass=vehicle_class, maxSpeed=speed)
     for k, (vehicle_class, speed, places) in enumerate(queries):
         if vehicle_class == _ON_FOOT:
             person = ElementTree.SubElement(root, "person", id=str(k), depart="0")

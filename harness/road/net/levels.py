@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from sumolib.net import Net
 from sumolib.net.edge import Edge
+from sumolib.net.lane import Lane
 
 from harness.errors import UsageError
 from harness.game.arrays import BoolArray, FloatArray
@@ -33,37 +34,28 @@ def heights_of_players_roads(net: Net, own: Collection[Edge]) -> FloatArray | No
     nodes = {node for edge in own for node in (edge.getFromNode(), edge.getToNode())}
     inside = [edge for edge in net.getEdges() if edge.isSpecial() and edge.getFromNode() in nodes]
     lanes = [lane for edge in [*own, *inside] for lane in edge.getLanes()]
-    return np.concatenate([_points(np.array(lane.getShape3D(), dtype=float)) for lane in lanes])
+    return np.concatenate([_points(lane) for lane in lanes])
 
 
-def roads_over_one_another(own: Sequence[Edge]) -> tuple[Edge, Edge, float] | None:
-    """Two edges of the players' routes that lie over one another, and the difference of their heights (m).
-
-    None without any. A game is flat: its players would touch where one drives over the other.
-    """
+def check_one_level(file: Path, own: Sequence[Edge]) -> None:
+    """Raise UsageError if edges of the players' routes lie over one another: a game is flat, and its players would
+    touch there."""
     if not own or np.ptp([height for edge in own for *_, height in edge.getLanes()[0].getShape3D()]) <= CLEARANCE_M:
-        return None
-    points = [np.concatenate([_points(np.array(lane.getShape3D(), dtype=float)) for lane in e.getLanes()]) for e in own]
+        return
+    points = [np.concatenate([_points(lane) for lane in edge.getLanes()]) for edge in own]
     for one, other in combinations(range(len(own)), 2):
         away = points[one][:, None] - points[other][None, :]
         heights_m = np.where(np.hypot(away[..., 0], away[..., 1]) <= _SPACING_M, np.abs(away[..., 2]), 0.0)
         if heights_m.max() > CLEARANCE_M:
-            return own[one], own[other], float(heights_m.max())
-    return None
+            names = f"{own[one].getID()!r} and {own[other].getID()!r}"
+            message = f"edges {names} of the players' routes lie over one another, {heights_m.max():.1f} m apart: "
+            message += "a game is flat, and its players would touch there"
+            raise UsageError.of(file, "routes", message, "choose routes on one level")
 
 
-def check_one_level(file: Path, own: Sequence[Edge]) -> None:
-    """Raise UsageError if roads of the players' routes lie over one another."""
-    found = roads_over_one_another(own)
-    if found is not None:
-        one, other, height_m = found
-        message = f"edges {one.getID()!r} and {other.getID()!r} of the players' routes lie over one another, "
-        message += f"{height_m:.1f} m apart: a game is flat, and its players would touch there"
-        raise UsageError.of(file, "routes", message, "choose routes on one level")
-
-
-def _points(line: FloatArray) -> FloatArray:
-    """[m, 3] points of a line [n, 3] at equal distances, with both ends."""
+def _points(lane: Lane) -> FloatArray:
+    """[m, 3] points of a lane at equal distances, with both ends."""
+    line = np.array(lane.getShape3D(), dtype=float)
     along_m = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line[:, :2], axis=0).T))))
     places_m = np.linspace(0.0, along_m[-1], int(along_m[-1] / _SPACING_M) + 2)
     return np.stack([np.interp(places_m, along_m, column) for column in line.T], axis=1)

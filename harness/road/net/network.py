@@ -36,7 +36,7 @@ _MOTOR = (  # vehicle classes on roads; a paved shoulder is a lane for emergency
     *("truck", "trailer", "motorcycle", "moped", "evehicle"),
 )
 _BACK = -0.9  # cosine of the angle between the directions of two opposite edges
-_TURNAROUNDS = (Connection.LINKDIR_TURN, Connection.LINKDIR_TURN_LEFTHAND)
+TURNAROUNDS = (Connection.LINKDIR_TURN, Connection.LINKDIR_TURN_LEFTHAND)
 
 
 def read_net(path: Path) -> Net:
@@ -135,7 +135,7 @@ def _lane_parts(net: Net, edges: Iterable[Edge], own: Collection[Edge], own_node
 def _curved_parts(lane: Lane, is_own: bool) -> Iterator[Part]:
     """The parts of a lane's connections that have no lane inside the junction."""
     for link in lane.getOutgoing():
-        if not link.getViaLaneID() and _is_for_cars(link):
+        if not link.getViaLaneID() and is_for_cars(link):
             after = link.getToLane()
             curve = surface.curve_between(lane_line(lane)[-2:], lane_line(after)[:2])
             if np.ptp(curve, axis=0).any():
@@ -170,7 +170,7 @@ def _followed_lines(net: Net, edges: Sequence[Edge]) -> Iterator[FloatArray]:
     for lane in (lane for edge in edges if edge in kept for lane in car_lanes(edge)):
         yield lane_line(lane)
         for link in lane.getOutgoing():
-            if _is_for_cars(link) and link.getTo() in kept:
+            if is_for_cars(link) and link.getTo() in kept:
                 before, after = _stretch(net, lane, ahead=False), _stretch(net, link.getToLane(), ahead=True)
                 yield np.concatenate((before, *connection_lines(net, link), after))
 
@@ -179,7 +179,7 @@ def _stretch(net: Net, lane: Lane, *, ahead: bool) -> FloatArray:
     """[n, 2] line of some metres from the lane's start on, or up to its end, over several lanes if it is short."""
     lines, length_m = [lane_line(lane)], lane.getLength()
     while length_m < _BEYOND_M:
-        links = [link for link in (lane.getOutgoing() if ahead else _incoming(lane)) if _is_for_cars(link)]
+        links = [link for link in (lane.getOutgoing() if ahead else _incoming(lane)) if is_for_cars(link)]
         if not links:
             break
         lane = links[0].getToLane() if ahead else links[0].getFromLane()
@@ -198,13 +198,19 @@ def _incoming(lane: Lane) -> list[Connection]:
     return [link for edge, links in incoming if not edge.isSpecial() for link in links if link.getToLane() is lane]
 
 
+def inner_lanes(net: Net, link: Connection) -> list[Lane]:
+    """The lanes of a connection inside its junction, in order; a net may have none there."""
+    lanes: list[Lane] = []
+    via = link.getViaLaneID()
+    while via:
+        lanes.append(net.getLane(via))
+        via = next((each.getViaLaneID() for each in lanes[-1].getOutgoing() if each.getViaLaneID()), "")
+    return lanes
+
+
 def connection_lines(net: Net, link: Connection) -> list[FloatArray]:
     """The lines [n, 2] of a connection inside its junction. A curve replaces the lane that a net may not have there."""
-    lines, via = [], link.getViaLaneID()
-    while via:
-        inner = net.getLane(via)
-        lines.append(lane_line(inner))
-        via = next((each.getViaLaneID() for each in inner.getOutgoing() if each.getViaLaneID()), "")
+    lines = [lane_line(lane) for lane in inner_lanes(net, link)]
     return lines or [surface.curve_between(lane_line(link.getFromLane())[-2:], lane_line(link.getToLane())[:2])]
 
 
@@ -258,7 +264,7 @@ def _is_fringe(edge: Edge, at_end: bool) -> bool:
 
 def _is_opposite(edge: Edge, other: Edge) -> bool:
     """Whether the other edge leads back from the edge's end, and is connected to it through turnarounds only."""
-    if any(link.getDirection() not in _TURNAROUNDS for link in edge.getConnections(other)):
+    if any(link.getDirection() not in TURNAROUNDS for link in edge.getConnections(other)):
         return False
     if other.getToNode() is edge.getFromNode():
         return True
@@ -287,7 +293,7 @@ def _cross_section(lane: Lane, at_end: bool) -> FloatArray:
     return np.stack((end - across, end + across))
 
 
-def _is_for_cars(link: Connection) -> bool:
+def is_for_cars(link: Connection) -> bool:
     """Whether cars may use a connection that is no turnaround."""
     lanes = (link.getFromLane(), link.getToLane())
-    return link.getDirection() not in _TURNAROUNDS and all(lane.allows(_CAR) for lane in lanes)
+    return link.getDirection() not in TURNAROUNDS and all(lane.allows(_CAR) for lane in lanes)

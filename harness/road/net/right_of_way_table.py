@@ -58,18 +58,9 @@ class _Builder:
         self._columns: dict[tuple[str, int], int] = {}  # of the table of signals
 
     def build(self, junctions: Sequence[Sequence[JunctionOnRoute]]) -> RightOfWay:
-        lines = [
-            (player, junction.begin_m, control_of(junction.link), self._column(junction.link))
-            for player, on_route in enumerate(junctions)
-            for junction in on_route
-        ]
-        rows = [
-            row
-            for player, on_route in enumerate(junctions)
-            for junction in on_route
-            for row in self._conflicts(player, junction)
-        ]
-        conflicts = Conflicts.of(rows)
+        numbered = [(player, junction) for player, on_route in enumerate(junctions) for junction in on_route]
+        lines = [(k, each.begin_m, control_of(each.link), self._column(each.link)) for k, each in numbered]
+        conflicts = Conflicts.of([row for k, each in numbered for row in self._conflicts(k, each)])
         samples = samples_of([self._stream(link) for link in self._numbers])
         return RightOfWay(
             conflicts=conflicts,
@@ -89,57 +80,45 @@ class _Builder:
         return self._columns.setdefault((link.getTLSID(), link.getTLLinkIndex()), len(self._columns))
 
     def _conflicts(self, player: int, junction: JunctionOnRoute) -> Iterator[dict[str, Any]]:
-        """The rows of `Conflicts` of a junction on a player's route."""
+        """The rows of `Conflicts` of a junction on a player's route: where the lanes of two links overlap."""
+        on_route = self._stream(junction.link).onward
         for own in _own_links(junction):
             for foe in foes_of(own.link):
-                zone = self._zone(junction, own.link, foe)
-                if zone is not None:
-                    yields, first_come = yields_to(own.link, foe)
-                    yield {
-                        "player": player,
-                        "stream": self._numbers.setdefault(foe, len(self._numbers)),
-                        "yields": yields,
-                        "first_come": first_come,
-                        "stop_m": junction.begin_m,
-                        "wait_m": junction.begin_m + self._wait_m(own.link, zone["begin_m"] - junction.begin_m),
-                        "right_m": own.right_m,
-                        "left_m": own.left_m,
-                        "own_link": self._column(own.link),
-                        "other_link": self._column(foe),
-                        "across": zone["crossing"] and self._turns_across(own.link, foe),
-                        **zone,
-                    }
+                way, stream = self._stream(own.link), self._stream(foe)
+                joins, overlap = own.link.getToLane() is foe.getToLane(), overlap_of(way, stream)
+                if overlap is None:
+                    continue
+                begin_m, end_m = _extent(on_route, overlap)
+                zone_m, zone_end_m = _extent(stream.onward, overlap)
+                from_m, until_m = _apart(stream, way, zone_m)
+                yields, first_come = yields_to(own.link, foe)
+                yield {
+                    "player": player,
+                    "stream": self._numbers.setdefault(foe, len(self._numbers)),
+                    "begin_m": junction.begin_m + begin_m,
+                    "end_m": junction.begin_m + (begin_m + _MERGING_M if joins else end_m),
+                    "crossing": not joins,
+                    "yields": yields,
+                    "first_come": first_come,
+                    "stop_m": junction.begin_m,
+                    "wait_m": junction.begin_m + (way.inner_wait_m if way.inner_wait_m < begin_m else 0.0),
+                    "right_m": own.right_m,
+                    "left_m": own.left_m,
+                    "own_link": self._column(own.link),
+                    "other_link": self._column(foe),
+                    "from_m": from_m,
+                    "until_m": until_m,
+                    "zone_m": zone_m,
+                    "length_m": _MERGING_M if joins else zone_end_m - zone_m,
+                    "across": not joins and _turns_across(way, stream),
+                }
 
-    def _wait_m(self, own: Connection, zone_m: float) -> float:
-        """Where a car on a link waits for the traffic of a zone, both in metres behind the stop line."""
-        inside_m = self._stream(own).inner_wait_m
-        return inside_m if inside_m < zone_m else 0.0
 
-    def _turns_across(self, own: Connection, foe: Connection) -> bool:
-        """Whether a link turns, and a foe comes from the opposite direction."""
-        way, stream = self._stream(own), self._stream(foe)
-        begin_rad = _heading_rad(way.onward, 0.0)
-        turned = np.cos(_heading_rad(way.onward, way.length_m) - begin_rad) < _STRAIGHT
-        return bool(turned and np.cos(_heading_rad(stream.onward, 0.0) - begin_rad) < -_ALIKE)
-
-    def _zone(self, junction: JunctionOnRoute, own: Connection, foe: Connection) -> dict[str, float | bool] | None:
-        """Where the lanes of two links overlap, in the columns of `Conflicts`; None if they do not."""
-        way, stream = self._stream(own), self._stream(foe)
-        joins, overlap = own.getToLane() is foe.getToLane(), overlap_of(way, stream)
-        if overlap is None:
-            return None
-        begin_m, end_m = _extent(self._stream(junction.link).onward, overlap)
-        zone_m, zone_end_m = _extent(stream.onward, overlap)
-        from_m, until_m = _apart(stream, way, zone_m)
-        return {
-            "crossing": not joins,
-            "begin_m": junction.begin_m + begin_m,
-            "end_m": junction.begin_m + (begin_m + _MERGING_M if joins else end_m),
-            "zone_m": zone_m,
-            "length_m": _MERGING_M if joins else zone_end_m - zone_m,
-            "from_m": from_m,
-            "until_m": until_m,
-        }
+def _turns_across(way: Stream, other: Stream) -> bool:
+    """Whether a way turns, and another one comes from the opposite direction."""
+    begin_rad, end_rad = (_heading_rad(way.onward, place_m) for place_m in (0.0, way.length_m))
+    turns = np.cos(end_rad - begin_rad) < _STRAIGHT
+    return bool(turns and np.cos(_heading_rad(other.onward, 0.0) - begin_rad) < -_ALIKE)
 
 
 def overlap_of(way: Stream, other: Stream) -> BaseGeometry | None:

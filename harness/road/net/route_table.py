@@ -19,9 +19,8 @@ from sumolib.net.lane import Lane
 
 from harness.game.arrays import FloatArray
 from harness.game.road import MARGIN_M, SPACING_M, Route
-from harness.road.net.network import car_lanes, lane_line
+from harness.road.net.network import car_lanes, connection_lines, inner_lanes, lane_line
 from harness.road.net.own_lanes import LanesOf, own_side
-from harness.road.net.surface import curve_between
 
 _FAR_SIDE_M = 50.0
 _ON_POINT_M = 0.1
@@ -77,7 +76,7 @@ def route_line(net: Net, edges: Sequence[Edge], lanes_of: LanesOf = car_lanes) -
 
 def line_over_junction(net: Net, link: Connection) -> FloatArray:
     """[n, 2] line of a link over its junction."""
-    return _over_junction(net, link)[0]
+    return _join(connection_lines(net, link))[0]
 
 
 def route_table(
@@ -150,10 +149,11 @@ def _pieces(net: Net, edges: Sequence[Edge], lanes_of: LanesOf) -> list[_Piece]:
         line = _between(entries[k], exits[k])
         pieces.append(_Piece(line=line, lanes=lanes, edge=k, speed_mps=entries[k].getSpeed()))
         if k < len(links):
-            line, speed = _over_junction(net, links[k])
             between = _links_between(edge, edges[k + 1], lanes_of)
-            lanes = [(_over_junction(net, link)[0], link.getToLane()) for link in between]
-            pieces.append(_Piece(line=line, lanes=lanes, edge=k + 1, speed_mps=speed, is_junction=True))
+            lanes = [(line_over_junction(net, link), link.getToLane()) for link in between]
+            speed_mps = [*inner_lanes(net, links[k]), links[k].getToLane()][0].getSpeed()
+            line = line_over_junction(net, links[k])
+            pieces.append(_Piece(line=line, lanes=lanes, edge=k + 1, speed_mps=speed_mps, is_junction=True))
     return pieces
 
 
@@ -196,20 +196,6 @@ def _between(entry: Lane, exit_: Lane) -> FloatArray:
     )
     blend = (share**2 * (3.0 - 2.0 * share))[:, None]
     return first + blend * (second - first)
-
-
-def _over_junction(net: Net, link: Connection) -> tuple[FloatArray, float]:
-    """[n, 2] line over the junction from one lane to the next, and its speed limit (m/s)."""
-    before, after = lane_line(link.getFromLane()), lane_line(link.getToLane())
-    inner: list[Lane] = []
-    via = link.getViaLaneID()
-    while via:
-        inner.append(net.getLane(via))
-        links = inner[-1].getOutgoing()
-        via = next((each.getViaLaneID() for each in links if each.getViaLaneID()), "")
-    if inner:
-        return _join([lane_line(lane) for lane in inner])[0], inner[0].getSpeed()
-    return curve_between(before[-2:], after[:2]), link.getToLane().getSpeed()
 
 
 def _length(line: FloatArray) -> float:

@@ -15,10 +15,9 @@ from sumolib.net.connection import Connection
 from sumolib.net.lane import Lane
 
 from harness.game.arrays import FloatArray, IntArray
-from harness.road.net.network import lane_line
+from harness.road.net.network import TURNAROUNDS, inner_lanes, lane_line
 from harness.road.net.route_table import line_over_junction
 
-TURNAROUNDS = (Connection.LINKDIR_TURN, Connection.LINKDIR_TURN_LEFTHAND)
 USERS = ("passenger", "bus", "truck", "motorcycle", "bicycle", "tram")
 _BEYOND_M = 20.0  # a stream goes on for this length behind the junction
 _BACK_M = 120.0  # and begins at most this far before it
@@ -92,10 +91,8 @@ class Stream:
     def inner_wait_m(self) -> float:
         """The place inside the junction where cars on the link wait, as at a left turn: SUMO divides the link's lane
         there. 0 where they wait at the stop line."""
-        net, via = self._feeders.net, self.link.getViaLaneID()
-        if not via or not any(each.getViaLaneID() for each in net.getLane(via).getOutgoing()):
-            return 0.0
-        return float(_joined([lane_line(net.getLane(via))]).length)
+        lanes = inner_lanes(self._feeders.net, self.link)
+        return float(_joined([lane_line(lanes[0])]).length) if len(lanes) > 1 else 0.0
 
     @cached_property
     def length_m(self) -> float:

@@ -45,25 +45,16 @@ def write_tiles(
     with file.open("w", encoding="utf-8") as out:
         attributes = {name: value for name, value in root.attrib.items() if not name.startswith("{")}
         out.write(f"<net{_written(attributes)}>\n")
-        north_m = Decimal(str(offset_m)) * (len(prefixes) - 1)
-        out.writelines(_copy(each, _wider(north_m)) for each in root.findall("location"))
+        for location in root.findall("location"):
+            *numbers, north = location.get("convBoundary", "0,0,0,0").split(",")
+            north_m = Decimal(north) + Decimal(str(offset_m)) * (len(prefixes) - 1)
+            location.set("convBoundary", ",".join((*numbers, str(north_m))))
+            out.writelines(_copy(location, _change("", Decimal(0))))
         for tag in _ORDER:
             for k, prefix in enumerate(prefixes if tag != "type" else ("",)):
                 change = _change(prefix, Decimal(str(offset_m)) * k)
                 out.writelines(_copy(each, change) for each in elements if each.tag == tag)
         out.write("</net>\n")
-
-
-def _wider(north_m: Decimal) -> Callable[[str, str, str], str]:
-    """Changes the boundary of a net so that it reaches farther north."""
-
-    def changed(tag: str, name: str, value: str) -> str:
-        if name != "convBoundary":
-            return value
-        *numbers, north = value.split(",")
-        return ",".join((*numbers, str(Decimal(north) + north_m)))
-
-    return changed
 
 
 def _change(prefix: str, shift_m: Decimal) -> Callable[[str, str, str], str]:
@@ -178,19 +169,10 @@ def tiled_net(net_file: Path, games: int, junctions: Collection[str] | None = No
     cache.mkdir(parents=True, exist_ok=True)
     merged = cache / f"{digest}.net.xml"
     if not merged.exists():
+        _LOGGER.info("copying the network %d times, once per scene", games, extra={"done": 0, "total": games + 1})
         with tempfile.TemporaryDirectory(dir=cache) as scratch:
-            os.replace(_merge(net_file, games, Path(scratch), junctions), merged)
+            copies, prefixes = Path(scratch) / "tiles.net.xml", [tile_prefix(game, games) for game in range(games)]
+            offset_m = tile_offset_m(net_file, games)
+            write_tiles(net_file, copies, prefixes=prefixes, offset_m=offset_m, junctions=junctions)
+            os.replace(copies, merged)
     return merged
-
-
-def _merge(net_file: Path, games: int, scratch: Path, junctions: Collection[str] | None) -> Path:
-    _log_merging(0, games)
-    merged = scratch / "merged.net.xml"
-    prefixes = [tile_prefix(game, games) for game in range(games)]
-    write_tiles(net_file, merged, prefixes=prefixes, offset_m=tile_offset_m(net_file, games), junctions=junctions)
-    _log_merging(games, games)
-    return merged
-
-
-def _log_merging(done: int, games: int) -> None:
-    _LOGGER.info("merging %d copies of the network, once per scene", games, extra={"done": done, "total": games + 1})

@@ -8,8 +8,8 @@ must yield, elsewhere the walker.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -19,7 +19,8 @@ from harness.config.road_user import WALKER_WIDTH_M
 from harness.config.scene import Scene
 from harness.game.arrays import FloatArray
 from harness.game.junctions import KERB_M, Conflicts, Control, RightOfWay, StopLines, Streams
-from harness.game.road import MARGIN_M, SPACING_M, Route
+from harness.game.road import Route
+from harness.road.net.meeting import route_points
 from harness.road.net.network import lane_line
 from harness.road.net.route_table import line_over_junction
 from harness.road.net.stream import CORRIDOR_M, USERS, Feeders, Piece, Stream, carries_traffic, samples_on
@@ -43,24 +44,13 @@ class WalkersWay:
     """Whether it follows a crossing of the net."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Crossing:
-    """Where two lines cross: begin and length of the zone on each, in metres along it."""
+class _Zone(NamedTuple):
+    """Where two lines cross: begin and end of the common zone on each, in metres along it."""
 
     own_m: float
     own_end_m: float
     other_m: float
     other_end_m: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Crossed:
-    """A stream of traffic that a way crosses."""
-
-    name: tuple[str, str]  # the lanes at both ends of its stop line
-    samples: FloatArray  # [N, 7]
-    place: _Crossing
-    width_m: float
 
 
 def ways_of(document: Scene, net: Net) -> list[WalkersWay]:
@@ -91,18 +81,17 @@ def with_walkers_conflicts(
         return len(lanes) - 1
 
     for way in ways:
-        for crossed in (*_lanes_crossed(feeders, way.line), *_links_crossed(feeders, way)):
-            stream = add(crossed.samples, crossed.name)
-            kerb_m = KERB_M + max(0.5 * (crossed.width_m - CORRIDOR_M), 0.0)
-            rows.append(_row(way.player, stream, crossed.place, yields=not way.marked, before_m=kerb_m))
+        for name, found, width_m, zone in _traffic_crossed(feeders, way):
+            kerb_m = KERB_M + max(0.5 * (width_m - CORRIDOR_M), 0.0)
+            rows.append(_row(way.player, add(found, name), zone, yields=not way.marked, before_m=kerb_m))
         stream = add(samples_on(Piece(0.0, shapely.get_coordinates(way.line), WALKERS_STREAM_M)), ("", ""))
         for player, route in enumerate(routes):
             if player in walkers:
                 continue
-            for crossing in _crossings(_line_of(route), CORRIDOR_M, way.line, _WALKER_M):
-                rows.append(_row(player, stream, crossing, yields=way.marked, before_m=_BEFORE_CROSSING_M))
+            for zone in _zones(shapely.LineString(route_points(route)), CORRIDOR_M, way.line, _WALKER_M):
+                rows.append(_row(player, stream, zone, yields=way.marked, before_m=_BEFORE_CROSSING_M))
                 if way.marked:
-                    lines.append((player, crossing.own_m - _BEFORE_CROSSING_M, Control.GIVE_WAY, -1))
+                    lines.append((player, zone.own_m - _BEFORE_CROSSING_M, Control.GIVE_WAY, -1))
     table = Conflicts.of(rows)
     return RightOfWay(
         conflicts=table,
@@ -113,39 +102,32 @@ def with_walkers_conflicts(
     )
 
 
-def _lanes_crossed(feeders: Feeders, way: shapely.LineString) -> Iterator[_Crossed]:
-    """The lanes of traffic that a way crosses, in the order of the net."""
-    for edge in feeders.net.getEdges(withInternal=False):
-        for lane in edge.getLanes():
-            if not any(lane.allows(user) for user in USERS):
-                continue
-            line = shapely.LineString(lane_line(lane))
-            for place in _crossings(way, _WALKER_M, line, min(CORRIDOR_M, lane.getWidth())):
-                pieces = feeders.approaches(lane, line.length - place.other_m)
-                yield _Crossed(
-                    name=(lane.getID(), lane.getID()),
-                    samples=np.concatenate([samples_on(piece) for piece in pieces]),
-                    place=replace(place, other_m=0.0, other_end_m=place.other_end_m - place.other_m),
-                    width_m=lane.getWidth(),
-                )
+def _traffic_crossed(feeders: Feeders, way: WalkersWay) -> Iterator[tuple[tuple[str, str], FloatArray, float, _Zone]]:
+    """The streams of traffic that a way crosses, in the order of the net: the lanes at both ends of the stop line,
+    samples [N, 7], width (m), and where.
+
+    A stream is a lane of traffic or, for a marked way, a link inside a junction.
+    """
+    net = feeders.net
+    for lane in (lane for edge in net.getEdges(withInternal=False) for lane in edge.getLanes()):
+        if not any(lane.allows(user) for user in USERS):
+            continue
+        line = shapely.LineString(lane_line(lane))
+        for zone in _zones(way.line, _WALKER_M, line, min(CORRIDOR_M, lane.getWidth())):
+            samples = [samples_on(piece) for piece in feeders.approaches(lane, line.length - zone.other_m)]
+            from_line = zone._replace(other_m=0.0, other_end_m=zone.other_end_m - zone.other_m)
+            yield (lane.getID(), lane.getID()), np.concatenate(samples), lane.getWidth(), from_line
+    for link in (link for node in net.getNodes() if way.marked for link in node.getConnections()):
+        if carries_traffic(link):
+            stream, inner = Stream(link, feeders), shapely.LineString(line_over_junction(net, link))
+            name = (link.getFromLane().getID(), link.getToLane().getID())
+            for zone in _zones(way.line, _WALKER_M, inner, min(CORRIDOR_M, stream.width_m)):
+                yield name, stream.samples, stream.width_m, zone
 
 
-def _links_crossed(feeders: Feeders, way: WalkersWay) -> Iterator[_Crossed]:
-    """The links of junctions that a marked way crosses inside them, in the order of the net."""
-    if not way.marked:
-        return
-    for node in feeders.net.getNodes():
-        for link in filter(carries_traffic, node.getConnections()):
-            stream = Stream(link, feeders)
-            inner = shapely.LineString(line_over_junction(feeders.net, link))
-            for place in _crossings(way.line, _WALKER_M, inner, min(CORRIDOR_M, stream.width_m)):
-                name = (link.getFromLane().getID(), link.getToLane().getID())
-                yield _Crossed(name=name, samples=stream.samples, place=place, width_m=stream.width_m)
-
-
-def _crossings(
+def _zones(
     own: shapely.LineString, own_width_m: float, other: shapely.LineString, other_width_m: float
-) -> Iterator[_Crossing]:
+) -> Iterator[_Zone]:
     """Where the corridors of two lines overlap."""
     if not shapely.dwithin(own, other, _NEAR_M):  # for large nets: quicker than the areas of corridors
         return
@@ -155,39 +137,28 @@ def _crossings(
         if part.area > 0.0 and part.intersects(own) and part.intersects(other):
             corners = shapely.points(shapely.get_coordinates(part))
             along, beside = (shapely.line_locate_point(line, corners) for line in (own, other))
-            yield _Crossing(
-                own_m=float(along.min()),
-                own_end_m=float(along.max()),
-                other_m=float(beside.min()),
-                other_end_m=float(beside.max()),
-            )
+            yield _Zone(float(along.min()), float(along.max()), float(beside.min()), float(beside.max()))
 
 
-def _line_of(route: Route) -> shapely.LineString:
-    first = round(MARGIN_M / SPACING_M)
-    points: FloatArray = np.stack((route.x_m[first:-first], route.y_m[first:-first]), axis=1)
-    return shapely.LineString(points)
-
-
-def _row(player: int, stream: int, crossing: _Crossing, *, yields: bool, before_m: float) -> dict[str, Any]:
+def _row(player: int, stream: int, zone: _Zone, *, yields: bool, before_m: float) -> dict[str, Any]:
     """A row of `Conflicts`."""
     return {
         "player": player,
         "stream": stream,
-        "begin_m": crossing.own_m,
-        "end_m": crossing.own_end_m,
+        "begin_m": zone.own_m,
+        "end_m": zone.own_end_m,
         "crossing": True,
         "yields": yields,
         "first_come": False,
-        "stop_m": crossing.own_m - before_m,
-        "wait_m": crossing.own_m - before_m,
+        "stop_m": zone.own_m - before_m,
+        "wait_m": zone.own_m - before_m,
         "right_m": -np.inf,
         "left_m": np.inf,
         "own_link": -1,
         "other_link": -1,
         "from_m": -np.inf,
         "until_m": np.inf,
-        "zone_m": crossing.other_m,
-        "length_m": crossing.other_end_m - crossing.other_m,
+        "zone_m": zone.other_m,
+        "length_m": zone.other_end_m - zone.other_m,
         "across": False,
     }

@@ -88,11 +88,9 @@ def _strips(net: Net, edges: Sequence[Edge]) -> Iterator[LaneStrip]:
                 continue
             yield _strip(lane, edge.getID())
             for link in lane.getOutgoing():
-                via = link.getViaLaneID()
-                while link.getTo() in kept and via:
-                    inner = net.getLane(via)
-                    yield _strip(inner, edge.getID(), link.getTo().getID())
-                    via = next((each.getViaLaneID() for each in inner.getOutgoing() if each.getViaLaneID()), "")
+                if link.getTo() in kept:
+                    for inner in network.inner_lanes(net, link):
+                        yield _strip(inner, edge.getID(), link.getTo().getID())
 
 
 def _strip(lane: Lane, *edges: str) -> LaneStrip:

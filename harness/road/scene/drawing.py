@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 import shapely
 from sumolib.net import Net
+from sumolib.net.lane import Lane
 
 from harness.config.scene import Goal
 from harness.game.arrays import FloatArray
@@ -25,35 +26,24 @@ def surfaces(net: Net) -> list[list[FloatArray]]:
 
 def lane_marks(net: Net) -> list[FloatArray]:
     """The lines [n, 2] between neighbouring lanes of an edge."""
-    marks = []
-    for edge in net.getEdges(withInternal=False):
-        for outer, inner in pairwise(car_lanes(edge)):  # SUMO counts an edge's lanes from its outer side
-            line = shapely.LineString(lane_line(outer))
-            side = 1.0 if _is_left_of(lane_line(inner), lane_line(outer)) else -1.0
-            line = line.offset_curve(side * outer.getWidth() / 2.0, join_style="mitre")
-            marks += [np.asarray(part.coords) for part in getattr(line, "geoms", [line]) if len(part.coords) > 1]
-    return marks
+    pairs = (pair for edge in net.getEdges(withInternal=False) for pair in pairwise(car_lanes(edge)))
+    return [line for outer, inner in pairs for line in _lines_between(outer, inner)]
 
 
 def edge_lines(net: Net) -> list[FloatArray]:
     """The lines [n, 2] between a lane of cars and a paved lane beside it that is none, such as a hard shoulder."""
-    lines = []
-    for edge in net.getEdges(withInternal=True):
-        cars = set(car_lanes(edge))
-        for outer, inner in pairwise(paved_lanes(edge)):
-            if (outer in cars) == (inner in cars):
-                continue
-            line = shapely.LineString(lane_line(outer))
-            side = 1.0 if _is_left_of(lane_line(inner), lane_line(outer)) else -1.0
-            line = line.offset_curve(side * outer.getWidth() / 2.0, join_style="mitre")
-            lines += [np.asarray(part.coords) for part in getattr(line, "geoms", [line]) if len(part.coords) > 1]
-    return lines
+    pairs = (pair for edge in net.getEdges(withInternal=True) for pair in pairwise(paved_lanes(edge)))
+    mixed = ((outer, inner) for outer, inner in pairs if outer.allows("passenger") != inner.allows("passenger"))
+    return [line for outer, inner in mixed for line in _lines_between(outer, inner)]
 
 
-def _is_left_of(line: FloatArray, other: FloatArray) -> bool:
-    """Whether a line [n, 2] is on the left of another one beside it, as inner lanes are where traffic keeps right."""
-    along, across = other[1] - other[0], line[0] - other[0]
-    return bool(along[0] * across[1] - along[1] * across[0] > 0.0)
+def _lines_between(outer: Lane, inner: Lane) -> list[FloatArray]:
+    """The lines [n, 2] at the inner side of a lane: SUMO counts an edge's lanes from its outer side."""
+    points, inner_points = lane_line(outer), lane_line(inner)
+    along, across = points[1] - points[0], inner_points[0] - points[0]
+    side = 1.0 if along[0] * across[1] - along[1] * across[0] > 0.0 else -1.0  # left where traffic keeps right
+    line = shapely.LineString(points).offset_curve(side * outer.getWidth() / 2.0, join_style="mitre")
+    return [np.asarray(part.coords) for part in getattr(line, "geoms", [line]) if len(part.coords) > 1]
 
 
 def goal_lines(scene: OpenScene, net: Net) -> list[FloatArray]:

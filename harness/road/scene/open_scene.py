@@ -27,7 +27,7 @@ from harness.road.scene.footway import opened_ground
 from harness.road.scene.open_obstacles import open_obstacles, with_types
 from harness.road.scene.scene_files import read_scene
 from harness.road.scene.scene_world import edges_of_players, opened_players, start_places, world_of
-from harness.road.scene.start_overlaps import check_starts, start_warnings
+from harness.road.scene.start_ranges import check_starts, start_warnings
 from harness.shipped_documents import named_document
 
 
