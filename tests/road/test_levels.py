@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -47,9 +48,8 @@ def seen_and_met(opened: OpenScene, own: str, other: str) -> tuple[int, bool, bo
     start = placed(opened, (CROSSING_X, CROSSING_Y, heading, 0.0), None)
     van = Departure(name="", vehicle_type="van", edges=(other,), depart_s=0.0, lane="0", position="base", speed="max")
     vans = [replace(van, name=f"van{k}", depart_s=2.0 * k) for k in range(5)]
-    arena = Arena(opened, 1, [Seat(None), Seat(None)])
     most, saw = 0, False
-    try:
+    with closing(Arena(opened, 1, [Seat(None), Seat(None)])) as arena:
         arena.reset({0: start}, {0: vans})
         for _ in range(190):
             if not arena.state.running[0, 0]:
@@ -58,8 +58,6 @@ def seen_and_met(opened: OpenScene, own: str, other: str) -> tuple[int, bool, bo
             most = max(most, int(step.quantities.bodies.present[0, 2:].sum()))
             saw |= bool(arena.observation[0, 0, LAYOUT.index("other0_seen")])
         return most, saw, arena.state.outcome[0, 0] == Outcome.COLLISION
-    finally:
-        arena.close()
 
 
 @pytest.mark.parametrize(("own", "other"), [("east", "north"), ("north", "east")])

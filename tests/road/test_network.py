@@ -18,7 +18,6 @@ from shapely.geometry.base import BaseGeometry
 from sumolib.net import Net
 from sumolib.net.edge import Edge
 
-from harness.errors import UsageError
 from harness.game.arrays import FloatArray
 from harness.game.geometry import Box
 from harness.game.rails import Rails
@@ -26,6 +25,7 @@ from harness.game.road import MARGIN_M, SPACING_M, Route
 from harness.road.net import network
 from harness.road.net.route_table import route_table
 from harness.road.scene.open_scene import OpenScene, open_scene
+from tests.support.roads import roundabout_sources
 
 Build = Callable[..., Path]
 
@@ -45,22 +45,6 @@ TWO_WAY = (
     '<node id="a" x="0" y="0"/><node id="b" x="150" y="0"/>',
     '<edge id="ab" from="a" to="b" numLanes="2"/><edge id="ba" from="b" to="a"/>',
 )
-ROUNDABOUT = (
-    "".join(
-        f'<node id="r{k}" x="{20 * np.cos(k * np.pi / 2):.2f}" y="{20 * np.sin(k * np.pi / 2):.2f}"/>'
-        f'<node id="o{k}" x="{80 * np.cos(k * np.pi / 2):.2f}" y="{80 * np.sin(k * np.pi / 2):.2f}"/>'
-        for k in range(4)
-    ),
-    "".join(
-        f'<edge id="r{k}" from="r{k}" to="r{(k + 1) % 4}" shape="'
-        + " ".join(
-            f"{20 * np.cos(k * np.pi / 2 + t * np.pi / 12):.2f},{20 * np.sin(k * np.pi / 2 + t * np.pi / 12):.2f}"
-            for t in range(7)
-        )
-        + f'"/><edge id="i{k}" from="o{k}" to="r{k}"/><edge id="o{k}" from="r{k}" to="o{k}"/>'
-        for k in range(4)
-    ),
-)
 # The entry has one lane, which leads to the right lane of the middle edge; the left exit starts from its left lane.
 CHANGE = (
     '<node id="a" x="0" y="-80"/><node id="b" x="80" y="0"/><node id="c" x="180" y="0"/>'
@@ -78,7 +62,7 @@ NETS = {
     "crossing with sidewalks": (CROSSING, ARMS, "", "--sidewalks.guess", "--crossings.guess"),
     "crossing of left-hand traffic": (CROSSING, ARMS, "", "--lefthand"),
     "two-way street": TWO_WAY,
-    "roundabout": ROUNDABOUT,
+    "roundabout": roundabout_sources(),
     "change of lanes": CHANGE,
 }
 GENERATED = {
@@ -350,32 +334,3 @@ def test_route__has_no_sidewalks(nets: dict[str, Read]) -> None:
     table = read.table("nc", "cs")
     row = stations(table).searchsorted(20.0)
     assert np.isfinite(table.lane_offset_m[row]).sum() == 1
-
-
-def test_route__a_gap_is_refused(nets: dict[str, Read]) -> None:
-    with pytest.raises(ValueError, match="no connection from edge 'cn' to 'wc'"):
-        nets["crossing"].table("cn", "wc")
-
-
-def test_route__a_missing_goal_is_refused(nets: dict[str, Read]) -> None:
-    net = nets["crossing"].net
-    edges = [net.getEdge("wc"), net.getEdge("cn")]
-    with pytest.raises(ValueError, match="does not pass the goal's edge 'ce'"):
-        route_table(net, nets["crossing"].area, edges, goal=net.getEdge("ce"), goal_position_m=1.0)
-
-
-def test_find__names_the_most_similar_edge_and_lane(nets: dict[str, Read]) -> None:
-    net, path = nets["change of lanes"].net, Path("a.net.xml")
-    assert network.find_edge(net, path, "key", "middle").getID() == "middle"
-    assert network.find_lane(net, path, "key", "middle_2").getID() == "middle_2"
-    with pytest.raises(UsageError, match=r"a\.net\.xml: key: the net has no edge 'midle' \(did you mean 'middle'\?\)"):
-        network.find_edge(net, path, "key", "midle")
-    with pytest.raises(UsageError, match=r"no lane 'middle_7' \(did you mean 'middle_"):
-        network.find_lane(net, path, "key", "middle_7")
-
-
-def test_read__a_net_without_roads_for_cars_is_refused(build_net: Build) -> None:
-    rails_only = '<edge id="e" from="a" to="b" allow="tram"/>'
-    path = build_net('<node id="a" x="0" y="0"/><node id="b" x="90" y="0"/>', rails_only)
-    with pytest.raises(UsageError, match="no lane that cars may use"):
-        network.read_net(path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -106,17 +107,14 @@ def test_lane__is_blocked_where_a_car_in_its_middle_has_no_room(
 def _fronts_after(scene: OpenScene, seconds: float) -> dict[str, float]:
     """Where the vehicles of the background traffic have come to at most."""
     away = placed(scene, (280.0, LEFT_Y if scene.lane_strips[-1].name == "road_1" else RIGHT_Y, 0.0, 0.0), None)
-    arena = Arena(scene, 1, [Seat(None), Seat(None)], recorded=True)
     farthest: dict[str, float] = {}
-    try:
+    with closing(Arena(scene, 1, [Seat(None), Seat(None)], recorded=True)) as arena:
         arena.reset({0: away}, {0: scene.departures(np.random.default_rng(1))})
         for _ in range(round(seconds / scene.world.step_s)):
             arena.step()
             assert arena.reading is not None
             for slot in np.flatnonzero(arena.reading.present[0]).tolist():
                 farthest[str(arena.reading.names[0, slot])] = float(arena.reading.x_m[0, slot] + 3.0)
-    finally:
-        arena.close()
     return farthest
 
 
@@ -142,8 +140,7 @@ def test_obstacle__stands_inside_a_junction(tmp_path: Path) -> None:
     scene = add(scene, '[[obstacle]]\nkind = "debris"\nx_m = 101.0\ny_m = 98.4\nheading_deg = 0.0\n')
     names = {each.strip.name for each in blockages(scene.lane_strips, scene.obstacles.poses(), scene.obstacles)}
     assert any(name.startswith(":c_") for name in names)
-    arena = Arena(scene, 2, [Seat(SumoDriver()), Seat(None)])
-    try:
+    with closing(Arena(scene, 2, [Seat(SumoDriver()), Seat(None)])) as arena:
         for _ in range(2):  # the obstacle is put back in every game
             arena.reset({game: drawn(scene, "start", game, present=[1.0, 0.0]) for game in range(2)})
             for _ in range(120):
@@ -151,5 +148,3 @@ def test_obstacle__stands_inside_a_junction(tmp_path: Path) -> None:
             assert (arena.state.speed_mps[:, 0] < 0.1).all()
             assert (arena.state.x_m[:, 0] + 2.3 < 100.5).all()
             assert (arena.state.x_m[:, 0] > 85.0).all()
-    finally:
-        arena.close()

@@ -20,7 +20,7 @@ from harness.game.junctions import SAMPLE, Conflicts, Control, RightOfWay
 from harness.road.net import network
 from harness.road.net.right_of_way_table import right_of_way
 from harness.road.net.stream import Feeders, Stream, carries_traffic
-from harness.road.scene.open_scene import OpenScene
+from tests.support.roads import roundabout_sources
 
 Build = Callable[..., Path]
 ARMS = [f"{a}{b}" for arm in "wesn" for a, b in ((arm, "c"), ("c", arm))]
@@ -34,24 +34,6 @@ def crossing_sources(kind: str) -> tuple[str, str]:
     nodes += "".join(f'<node id="{name}" x="{x}" y="{y}"/>' for name, x, y in ends)
     edges = [f'<edge id="{e}" from="{e[0]}" to="{e[1]}" priority="{2 if set(e) & set("we") else 1}"/>' for e in ARMS]
     return nodes, "".join(edges)
-
-
-def roundabout_sources() -> tuple[str, str]:
-    """The nodes and edges of a ring of four entries i0 to i3, ring edges r0 to r3 and exits o0 to o3."""
-
-    def place(radius_m: float, quarter: float) -> str:
-        turned = quarter * np.pi / 2.0
-        return f"{radius_m * np.cos(turned):.2f},{radius_m * np.sin(turned):.2f}"
-
-    nodes, edges = "", ""
-    for k in range(4):
-        for name, radius_m in (("r", 20.0), ("o", 80.0)):
-            x, y = place(radius_m, k).split(",")
-            nodes += f'<node id="{name}{k}" x="{x}" y="{y}"/>'
-        shape = " ".join(place(20.0, k + share) for share in np.linspace(0.0, 1.0, 7))
-        edges += f'<edge id="r{k}" from="r{k}" to="r{(k + 1) % 4}" shape="{shape}"/>'
-        edges += f'<edge id="i{k}" from="o{k}" to="r{k}"/><edge id="o{k}" from="r{k}" to="o{k}"/>'
-    return nodes, edges
 
 
 @pytest.fixture(scope="module")
@@ -202,19 +184,6 @@ def test_yields__to_the_first_at_an_all_way_stop_and_a_zipper(crossings: dict[st
         assert met["first_come"]
 
 
-def test_t_junction__the_left_turn_yields_to_both_directions(build_net: Build) -> None:
-    nodes, edges = crossing_sources("priority")
-    edges = "".join(f"<edge{each}" for each in edges.split("<edge")[1:] if 'n"' not in each.split("numLanes")[0])
-    net = network.read_net(build_net(nodes, edges, "", "--no-turnarounds"))
-    for stream in ("wc ce", "ec cw"):
-        met = conflict(net, "sc cw", stream)
-        assert met is not None
-        assert met["yields"]
-    met = conflict(net, "wc ce", "sc cw")
-    assert met is not None
-    assert not met["yields"]
-
-
 def test_roundabout__an_entry_yields_to_the_ring_and_the_ring_to_no_entry(build_net: Build) -> None:
     tables = of(network.read_net(build_net(*roundabout_sources())), "i0 r0 r1 o2")
     conflicts = tables.conflicts
@@ -238,11 +207,6 @@ def test_merge__only_the_lane_that_is_joined_has_a_conflict(build_net: Build) ->
     # the main road's line is in its left lane: a car is in the right lane if it is more than half a lane to the right
     assert (conflicts.right_m[0], conflicts.left_m[0]) == (-np.inf, pytest.approx(-1.6))
     assert (conflicts.right_m[1], conflicts.left_m[1]) == (-np.inf, np.inf)
-
-
-def test_merge_scene__has_no_conflict(merge: OpenScene) -> None:
-    assert len(merge.world.right_of_way.conflicts.player) == 0
-    assert merge.world.right_of_way.stop_lines.control.tolist() == [Control.NONE, Control.NONE]
 
 
 # --- stop lines and signals ------------------------------------------------------------------------------------------

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -75,16 +76,13 @@ def test_game__begins_with_persons_on_their_way(tmp_path: Path) -> None:
     # they began 40, 30, 20 and 10 s ago, at 5 km/h, with SUMO's differences of 10 % between persons and its dawdling
     walked_m = np.array([float(each.position) for each in found])
     assert walked_m / np.array([40.0, 30.0, 20.0, 10.0]) == pytest.approx(1.25, abs=0.4)
-    arena = Arena(scene, 1, [Seat(None), Seat(None)], recorded=True)
-    try:
+    with closing(Arena(scene, 1, [Seat(None), Seat(None)], recorded=True)) as arena:
         away = placed(scene, (150.0, -4.8, 0.0, 0.0), (150.0, -1.6, 0.0, 0.0))
         arena.reset({0: away}, {0: scene.departures(generator_of("a"))})
         for _ in range(2):
             arena.step(np.zeros((1, 2, 2)))
         assert arena.reading is not None
         places_m = dict(zip(arena.reading.names[0], arena.reading.x_m[0], strict=True))
-    finally:
-        arena.close()
     assert [places_m[each.name] for each in found] == pytest.approx(walked_m.tolist(), abs=1.0)
 
 
@@ -118,8 +116,7 @@ def test_arena__has_the_vehicles_where_the_warm_up_left_them(scene: OpenScene, g
     start = drawn(scene, 1)
     departures = scene.departures(generator_of("b"))
     expected = clear_of_players(departures, start, scene.world.length_m)
-    arena = Arena(scene, games, [Seat(_Still()), Seat(_Still())], recorded=True)
-    try:
+    with closing(Arena(scene, games, [Seat(Steady()), Seat(Steady())], recorded=True)) as arena:
         for _ in range(2):  # a second game begins as the first one did
             arena.reset(dict.fromkeys(range(games), start), dict.fromkeys(range(games), departures))
             arena.step()
@@ -131,20 +128,15 @@ def test_arena__has_the_vehicles_where_the_warm_up_left_them(scene: OpenScene, g
                     assert each.motion is not None
                     moved = x_m[each.name] + 0.5 * each.motion.length_m - each.motion.x_m
                     assert moved == pytest.approx(each.motion.speed_mps * scene.world.step_s, abs=0.12)
-    finally:
-        arena.close()
 
 
 def test_first_observation__shows_the_vehicles_of_the_warm_up(scene: OpenScene) -> None:
     van = next(each for each in on_road(scene.departures(generator_of("b"))) if each.lane == "road_0")
     assert van.motion is not None
     start = placed(scene, (van.motion.x_m - 40.0, van.motion.y_m, 0.0, 10.0), None)
-    arena = Arena(scene, 1, [Seat(_Still()), Seat(_Still())])
-    try:
+    with closing(Arena(scene, 1, [Seat(Steady()), Seat(Steady())])) as arena:
         arena.reset({0: start}, {0: [van]})
         seen = dict(zip(LAYOUT, in_units(arena.observation[0, 0], 0.5), strict=True))
-    finally:
-        arena.close()
     assert seen["other0_ahead_m"] == pytest.approx(40.0 - 3.0, abs=1e-3)  # to the middle of the van
     assert seen["leader_gap_m"] == pytest.approx(40.0 - 6.0 - 2.3, abs=1e-3)
     assert seen["leader_mps"] == pytest.approx(van.motion.speed_mps - 10.0, abs=1e-3)
@@ -154,8 +146,7 @@ def test_first_observation__is_the_same_in_a_game_among_others(scene: OpenScene)
     starts, departures = [drawn(scene, k) for k in range(3)], [scene.departures(generator_of(k)) for k in range(3)]
 
     def first_observations(games: Sequence[int], *, recorded: bool, again: int) -> FloatArray:
-        arena = Arena(scene, len(games), [Seat(_Still()), Seat(_Still())], recorded=recorded)
-        try:
+        with closing(Arena(scene, len(games), [Seat(Steady()), Seat(Steady())], recorded=recorded)) as arena:
             arena.reset(
                 {k: starts[game] for k, game in enumerate(games)}, {k: departures[game] for k, game in enumerate(games)}
             )
@@ -163,8 +154,6 @@ def test_first_observation__is_the_same_in_a_game_among_others(scene: OpenScene)
                 arena.step()
             arena.reset({again: starts[games[again]]}, {again: departures[games[again]]})
             return arena.observation[again]
-        finally:
-            arena.close()
 
     alone, among = (
         first_observations([1], recorded=True, again=0),
@@ -183,18 +172,6 @@ def test_trace__has_the_vehicles_from_the_first_sample_on(scene: OpenScene) -> N
     assert first["vehicle_type"].tolist() == second["vehicle_type"].tolist()
     moved_m = second["x_m"].to_numpy() - first["x_m"].to_numpy()
     np.testing.assert_allclose(moved_m, second["speed_mps"] * scene.world.step_s, atol=0.01)
-
-
-class _Still:
-    """A driver that keeps its speed."""
-
-    takes_over = True
-
-    def reset(self, games: object) -> None:
-        """It keeps no state."""
-
-    def decide(self, games: Sequence[int], observation: object, noise: object) -> object:
-        return np.zeros((len(games), 2))
 
 
 def test_start__is_clear_of_vehicles(scene: OpenScene) -> None:

@@ -16,8 +16,6 @@ from harness.road.net.network import read_net
 from harness.road.scene.open_scene import OpenScene
 from harness.road.xml.xml_file import parse_xml, xml_bytes
 
-XSI = 'xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance"'
-
 
 def packed(folder: Path, content: bytes) -> Path:
     file = folder / "small.net.xml.gz"
@@ -60,24 +58,9 @@ def test_gzip__a_net_is_checked_read_tiled_and_replayed(
     assert readNet(str(tiles.tiled_net(net, 2))).hasEdge("g1_approach")
 
 
-@pytest.mark.parametrize(
-    "address",
-    [
-        "http://sumo.dlr.de/xsd/net_file.xsd",
-        "https://sumo-sim.org/xsd/net_file.xsd",
-        "https://sumo.sf.net/xsd/net_file.xsd",
-        "http://sumo.sourceforge.net/xsd/net_file.xsd",
-    ],
-)
-def test_schema__addresses_that_were_sumos_are_accepted(tmp_path: Path, address: str) -> None:
+def test_schema__addresses_that_were_sumos_are_accepted(tmp_path: Path) -> None:
     file = tmp_path / "small.net.xml"
-    file.write_text(f'<net {XSI} xsi:noNamespaceSchemaLocation="{address}"/>', encoding="utf-8")
-    assert parse_xml(file).tag == "net"
-
-
-@pytest.mark.parametrize("address", ["https://sumo.sf.net.example.org/xsd/net_file.xsd", "file:///etc/net_file.xsd"])
-def test_schema__other_addresses_are_refused(tmp_path: Path, address: str) -> None:
-    file = tmp_path / "small.net.xml"
-    file.write_text(f'<net {XSI} xsi:noNamespaceSchemaLocation="{address}"/>', encoding="utf-8")
-    with pytest.raises(UsageError, match="names the schema"):
-        parse_xml(file)
+    for server in ("http://sumo.dlr.de", "https://sumo-sim.org", "https://sumo.sf.net", "http://sumo.sourceforge.net"):
+        address = f'xsi:noNamespaceSchemaLocation="{server}/xsd/net_file.xsd"'
+        file.write_text(f'<net xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" {address}/>', encoding="utf-8")
+        assert parse_xml(file).tag == "net"

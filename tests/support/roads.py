@@ -1,4 +1,4 @@
-"""Routes of simple shapes: straight and round."""
+"""Roads of simple shapes: straight and round routes, and the sources of a net with a roundabout."""
 
 from __future__ import annotations
 
@@ -45,3 +45,21 @@ def arc(radius: float, length: float = 60.0) -> Route:
 def on_arc(radius: float, station: float, offset: float) -> tuple[float, float]:
     turned = station / radius
     return (radius - offset) * np.sin(turned), radius - (radius - offset) * np.cos(turned)
+
+
+def roundabout_sources() -> tuple[str, str]:
+    """The nodes and edges of a ring of four entries i0 to i3, ring edges r0 to r3 and exits o0 to o3."""
+
+    def place(radius_m: float, quarter: float) -> str:
+        turned = quarter * np.pi / 2.0
+        return f"{radius_m * np.cos(turned):.2f},{radius_m * np.sin(turned):.2f}"
+
+    nodes, edges = "", ""
+    for k in range(4):
+        for name, radius_m in (("r", 20.0), ("o", 80.0)):
+            x, y = place(radius_m, k).split(",")
+            nodes += f'<node id="{name}{k}" x="{x}" y="{y}"/>'
+        shape = " ".join(place(20.0, k + share) for share in np.linspace(0.0, 1.0, 7))
+        edges += f'<edge id="r{k}" from="r{k}" to="r{(k + 1) % 4}" shape="{shape}"/>'
+        edges += f'<edge id="i{k}" from="o{k}" to="r{k}"/><edge id="o{k}" from="r{k}" to="o{k}"/>'
+    return nodes, edges

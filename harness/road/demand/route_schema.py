@@ -127,7 +127,7 @@ def check_content(path: Path, root: ElementTree.Element) -> None:
         message = "is not a SUMO route file: its root is not routes"
         raise UsageError.of(path, str(root.tag), message, "name a .rou.xml")
     _remove_records(root)
-    problems = [*_refused(path, root), *_invalid_names(path, root)] or problems_in(path, root, _KINDS)
+    problems = [*_refused(path, root), *_invalid_names(path, root), *problems_in(path, root, _KINDS, _REFUSED)]
     if problems:
         raise UsageError(problems)
 

@@ -33,20 +33,30 @@ class ElementKind(NamedTuple):
 _PARAM = ElementKind((), ("key", "value"))
 
 
-def problems_in(path: Path, root: ElementTree.Element, known: Mapping[str, ElementKind]) -> list[Problem]:
+def problems_in(
+    path: Path, root: ElementTree.Element, known: Mapping[str, ElementKind], reported: Collection[str] = ()
+) -> list[Problem]:
     """The first problems with the names of an element and of its descendants.
 
-    `known` has the kinds of elements by their tags. All others may have params only.
+    `known` has the kinds of elements by their tags. All others may have params only. Tags in `reported`, and attributes
+    and children there after the tag of their element, are passed over.
     """
-    return list(islice(_problems(str(path), root, {"param": _PARAM, **known}, where=root.tag), _MOST_PROBLEMS))
+    kinds = {"param": _PARAM, **known}
+    return list(islice(_problems(str(path), root, kinds, reported, where=root.tag), _MOST_PROBLEMS))
 
 
 def _problems(
-    path: str, element: ElementTree.Element, known: Mapping[str, ElementKind], *, where: str
+    path: str,
+    element: ElementTree.Element,
+    known: Mapping[str, ElementKind],
+    reported: Collection[str],
+    *,
+    where: str,
 ) -> Iterator[Problem]:
     children, attributes = known.get(element.tag, ElementKind())
     for name in element.attrib if attributes is not None else ():
-        if name not in (attributes or ()) and not name.startswith("{http://www.w3.org/2001/XMLSchema-instance}"):
+        is_other = name.startswith("{http://www.w3.org/2001/XMLSchema-instance}") or f"{element.tag}.{name}" in reported
+        if name not in (attributes or ()) and not is_other:
             yield Problem(path, where, f"unknown attribute {name!r}", _nearest(name, attributes or ()))
     for name in _CLASS_ATTRIBUTES:
         for each in element.get(name, "").split():
@@ -57,13 +67,15 @@ def _problems(
         message = f"a param {element.get('key')!r} makes SUMO read or write other files"
         yield Problem(path, where, message, "leave it out: the harness records every game itself")
     for child in element:
+        if child.tag in reported or f"{element.tag}.{child.tag}" in reported:
+            continue
         inner = f"{child.tag} {child.get('id')}" if child.get("id") else str(child.tag)
         if " " in where and not child.get("id"):
             inner = f"{where}.{child.tag}"
         if child.tag not in children:
             yield Problem(path, str(child.tag), "is not understood here", _nearest(str(child.tag), children))
         else:
-            yield from _problems(path, child, known, where=inner)
+            yield from _problems(path, child, known, reported, where=inner)
 
 
 def _nearest(name: str, valid: Collection[str]) -> str:
