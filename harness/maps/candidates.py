@@ -152,7 +152,6 @@ def _kind(one: Connection, other: Connection, rings: set[str], arms: int) -> Can
 
 
 def _lane_ends(edge: Edge) -> Iterator[Candidate]:
-    """Lanes that end at the end of an edge beside one that goes on."""
     lanes = car_lanes(edge)
     onward = {lane: for_cars(lane.getOutgoing()) for lane in lanes}
     for lane in lanes:
@@ -190,7 +189,6 @@ def _zebra(net: Net, crossing: Edge) -> Iterator[Candidate]:
 
 
 def _over(net: Net, link: Connection) -> shapely.LineString:
-    """The line of a connection with some metres before and behind it."""
     before = substring(shapely.LineString(lane_line(link.getFromLane())), -_BESIDE_M, 0.0)
     behind = substring(shapely.LineString(lane_line(link.getToLane())), 0.0, _BESIDE_M)
     ends = [shapely.get_coordinates(each) for each in (before, behind)]

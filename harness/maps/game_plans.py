@@ -113,7 +113,6 @@ class Plans:
         return found
 
     def _plan(self, candidate: Candidate) -> GamePlan | str:
-        """The plan of a candidate, or the reason why it has none."""
         ways = [way for way in (candidate.first, candidate.second) if way is not None]
         if narrow := _narrow(ways):
             return narrow

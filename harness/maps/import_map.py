@@ -62,7 +62,6 @@ def import_map(path: Path, folder: Path, *, left_hand: bool) -> tuple[Path, Net]
 
 
 def _copied(path: Path, folder: Path, left_hand: bool) -> tuple[Path, Net]:
-    """A net in the folder, unpacked, and its content."""
     try:
         check_file(path, MOST_BYTES)
     except OSError as error:

@@ -107,7 +107,6 @@ def facts_of(path: Path, kind: MapKind) -> MapFacts:
 
 
 def _note_osm(element: Element, facts: MapFacts) -> None:
-    """Count the roads among the ways of an OpenStreetMap file."""
     if element.tag == "way":
         tags = {each.get("k"): each.get("v", "") for each in element.iter("tag")}
         is_road = tags.get("highway") in _FOR_CARS

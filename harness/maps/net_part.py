@@ -32,7 +32,6 @@ def write_part(net: Net, net_file: Path, routes: Collection[str], file: Path) ->
 
 
 def _boundary(root: ElementTree.Element) -> list[float]:
-    """The least x and y and the greatest x and y of a net's lanes and junctions."""
     shapes = [each.get("shape", "") for tag in ("lane", "junction") for each in root.iter(tag)]
     points = np.array([point.split(",")[:2] for shape in shapes for point in shape.split()], dtype=float)
     return [float(each) for each in (*points.min(axis=0), *points.max(axis=0))]

@@ -17,8 +17,7 @@ from harness.game.geometry import Box, box_distance
 from harness.game.initial_state import InitialState
 from harness.road.demand.route_file import SHARE, Departure, Motion
 from harness.road.demand.stops import Stop
-from harness.road.scene.blocked_lanes import blockages
-from harness.road.scene.open_obstacles import boxes_of
+from harness.road.scene.open_obstacles import blockages, boxes_of
 from harness.road.scene.open_scene import OpenScene
 from harness.road.xml.xml_file import number_of
 

@@ -118,23 +118,17 @@ STAGE = ("stages", "naive_alone-seed1")
 ODD: dict[str, tuple[Spoil, tuple[str, ...]]] = {
     "no format": (lacking("format"), ("format",)),
     "a later format": (holding("format", value=2), ("format",)),
-    "a format that is text": (holding("format", value="1"), ("format",)),
     "no name": (lacking("name"), ("name",)),
     "a name that leads up": (holding("name", value="../x"), ("name",)),
     "a name of markup": (holding("name", value="<script>alert(1)</script>"), ("name",)),
-    "a name with a line end": (holding("name", value="a\nb"), ("name",)),
     "half a character for a name": (put(MANIFEST, '{"format": 1, "name": "\\ud800"}'), ()),
     "a truth value that is text": (holding("quick", value="no"), ("quick",)),
     "a campaign that is a list": (holding("campaign", value=[]), ("campaign",)),
     "personas that are numbers": (holding("personas", value=[1]), ("personas",)),
     "a persona that leads up": (holding("personas", value=["../x"]), ("personas",)),
-    "a persona of markup": (holding("personas", value=["<img src=x>"]), ("personas",)),
     "no seeds": (holding("seeds", value=[]), ("seeds",)),
-    "a seed that is text": (holding("seeds", value=["1"]), ("seeds",)),
     "a seed of 400 digits": (holding("seeds", value=[10**400]), ("seeds",)),
     "a negative seed": (holding("seeds", value=[-1]), ("seeds",)),
-    "a truth value for a seed": (holding("seeds", value=[True]), ("seeds",)),
-    "versions that are a list": (holding("versions", value=[]), ("versions",)),
     "a version that is a table": (holding("versions", "harness", value={}), ("versions",)),
     "stages that are a list": (holding("stages", value=[]), ("stages",)),
     "a stage that is text": (holding(*STAGE, value="done"), ("naive_alone-seed1",)),
@@ -145,14 +139,11 @@ ODD: dict[str, tuple[Spoil, tuple[str, ...]]] = {
     "a stage that leads up": (renamed("../../x"), ("../../x",)),
     "a stage that leads to the root": (renamed("/etc/x"), ("/etc/x",)),
     "a stage with a zero": (renamed("a\0b"), ("is no stage",)),
-    "a stage with a line end": (renamed("a\nb"), ("is no stage",)),
-    "a stage of markup": (renamed("<b>"), ("is no stage",)),
     "a stage of 5,000 letters": (renamed("x" * 20_000), ("stages",)),
     "steps that are text": (holding("stages", "speedy-seed1", "steps", value="many"), ("steps",)),
     "steps below none": (holding("stages", "speedy-seed1", "steps", value=-1), ("steps",)),
     "seconds that are no number": (put(MANIFEST, b'{"format": NaN}'), ("format",)),
     "a duration without end": (holding(*STAGE, "seconds", value=1e308), ("seconds",)),
-    "a message that is a list": (holding(*STAGE, "message", value=[]), ("message",)),
     "a persona's document that is text": (holding("persona_documents", "speedy", value="x"), ("persona_documents",)),
 }
 OF_REPORT: dict[str, tuple[Spoil, tuple[str, ...]]] = {
@@ -174,11 +165,9 @@ TABLES: dict[str, tuple[Callable[[str], Spoil], tuple[str, ...]]] = {
     "a row too short": (lambda file: inserted(file, b"a,b\n", 1.0), ()),
     "a seed that is text": (lambda file: edit(file, "naive_alone,,1,", "naive_alone,,one,"), ()),
     "a seed of 400 digits": (lambda file: edit(file, "naive_alone,,1,", f"naive_alone,,{'9' * 400},"), ()),
-    "a seed of half": (lambda file: edit(file, "naive_alone,,1,", "naive_alone,,1.5,"), ()),
     "an episode of nothing": (lambda file: edit(file, "naive_alone,,1,0,", "naive_alone,,1,,"), ()),
     "a quote that is not closed": (lambda file: edit(file, "naive_alone,", '"naive_alone,'), ()),
     "another kind of table": (lambda file: put(file, "stage,persona,seed\n"), ()),
-    "a cell of a megabyte": (lambda file: edit(file, "naive_alone,", "x" * 1_000_000 + ","), ()),
 }
 RUNS = [
     *to(REPORT, *whole_file(MANIFEST)[1:], *whole_file(GAMES), *whole_file(TRACES)),
@@ -216,8 +205,6 @@ RUNS = [
     *(
         Bad(f"report: policy.json with {way}", put(CARD, content), ("policy.json", *words), REPORT)
         for way, content, words in (
-            ("nothing", "", ()),
-            ("a list", "[]", ()),
             ("a pickle", pickle.dumps({}), ()),
             ("no player", '{"format": 1, "observation": []}', ("player",)),
             ("a player that leads up", '{"format": 1, "observation": [], "player": "../x"}', ("player",)),

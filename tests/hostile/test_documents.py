@@ -1,4 +1,4 @@
-"""Whatever is wrong with a document, it is said once, with file and key, and nothing else happens."""
+"""Whatever is wrong with a document or a run folder, it is said once, with file and key, and nothing else happens."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import pytest
 
 from tests.hostile.bad_documents import CAMPAIGNS, PERSONAS, POLICIES, SCENES
 from tests.hostile.bad_roads import NETS, ROUTE_FILES
-from tests.hostile.inputs import CHECK, Bad, Desk
+from tests.hostile.bad_run_folders import LIST, REPORT, RUNS
+from tests.hostile.inputs import CHECK, Bad, Desk, traces_of, write_run
 
 
 @pytest.fixture
@@ -22,4 +23,19 @@ def test_project__is_in_order_before_it_is_spoiled(desk: Desk) -> None:
 
 @pytest.mark.parametrize("bad", [*CAMPAIGNS, *PERSONAS, *SCENES, *NETS, *ROUTE_FILES, *POLICIES], ids=repr)
 def test_document__that_is_wrong(bad: Bad, desk: Desk) -> None:
+    desk.refuses(bad)
+
+
+def test_run__is_in_order_before_it_is_spoiled(desk: Desk) -> None:
+    write_run(desk.folder)
+    assert desk.run(LIST).code == 0
+    before = traces_of(desk.folder)
+    said = desk.run(REPORT)
+    assert said.code == 0, said.err
+    assert traces_of(desk.folder) == before, "a report from the same folder is the same"
+
+
+@pytest.mark.parametrize("bad", RUNS, ids=repr)
+def test_run__that_is_wrong(bad: Bad, desk: Desk) -> None:
+    write_run(desk.folder)
     desk.refuses(bad)

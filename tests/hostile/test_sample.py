@@ -107,7 +107,7 @@ def test_inputs__that_were_tried_are_many_and_each_another(tmp_path: Path) -> No
     for kind, rows in TABLES.items():
         for k, bad in enumerate(rows):
             if bad.command != CHECK:
-                continue  # run folders: counted below by name, each is spoiled in test_run_folders
+                continue  # run folders: counted below by name, each is spoiled in test_documents
             folder = tmp_path / f"{kind}{k}"
             project = write_project(folder)
             bad.spoil(project)

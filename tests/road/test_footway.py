@@ -187,8 +187,3 @@ def test_bicycle__on_a_route_that_forbids_bicycles_is_refused(tmp_path: Path) ->
     forbid = ("cyclist.net.xml", 'id="east_out_0" index="0" allow="bicycle"', 'id="east_out_0" index="0" allow="bus"')
     text = problem(changed(tmp_path, "cyclist", forbid))
     assert "vehicle non_ego: its route passes edge 'east_out', which forbids bicycles" in text
-
-
-def test_bicycle__of_the_type_of_a_car_is_refused(tmp_path: Path) -> None:
-    text = problem(changed(tmp_path, "cyclist", ("cyclist.rou.xml", ' vClass="bicycle"', "")))
-    assert "vType cyclist: has vClass 'passenger', and the scene's player is a bicycle" in text

@@ -11,7 +11,7 @@ import pytest
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
 from harness.errors import UsageError
-from harness.road.scene.blocked_lanes import blockages
+from harness.road.scene.open_obstacles import blockages
 from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.scenes import (
     CROSSING_EDGES,

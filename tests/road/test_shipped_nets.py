@@ -6,8 +6,6 @@ Property of every net: a car that follows the centre line of a lane or of a conn
 
 from __future__ import annotations
 
-import gzip
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -15,11 +13,9 @@ import sumo
 
 from benchmarks.nets import shipped_nets, survey
 
-SMALL_BYTES = 200_000
 FOR_OTHERS = {"racing/spreewaldring.net.xml": "vip", "rail/net.net.xml": "rail", "rail_demo/net.net.xml": "rail"}
 """Nets without a lane for cars, and what their lanes are for."""
 NETS = shipped_nets()
-SOME = [path for path in NETS if path.suffix == ".xml" and path.stat().st_size < SMALL_BYTES]
 
 
 def label(path: Path) -> str:
@@ -38,14 +34,6 @@ def check(path: Path) -> None:
 def test_shipped_nets__are_found() -> None:
     assert len(NETS) >= 28, sumo.SUMO_HOME
     assert {label(path) for path in NETS} >= set(FOR_OTHERS)
-
-
-@pytest.mark.parametrize("path", SOME, ids=label)
-def test_shipped_nets__small_ones_are_the_same_when_compressed(path: Path, tmp_path: Path) -> None:
-    packed = tmp_path / f"{path.name}.gz"
-    packed.write_bytes(gzip.compress(path.read_bytes(), compresslevel=1))
-    plain, compressed = (survey(file, most=10, routes=1) for file in (path, packed))
-    assert replace(compressed, file=path, seconds=plain.seconds) == plain
 
 
 @pytest.mark.parametrize("path", NETS, ids=label)

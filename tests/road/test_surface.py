@@ -39,26 +39,6 @@ def road(x_from: float, x_to: float, height_m: float, own: bool) -> Part:
     return Part(shape=surface.lane_shape(line[:, :2], 6.0), line=line, own=own)
 
 
-def crossing_road(height_m: float, own: bool) -> Part:
-    line = np.array([[50.0, -50.0, height_m], [50.0, 50.0, height_m]])
-    return Part(shape=surface.lane_shape(line[:, :2], 6.0), line=line, own=own)
-
-
-@pytest.mark.parametrize("own_is_above", [False, True])
-def test_levels__the_other_road_is_cut_off_beside_the_own_one(own_is_above: bool) -> None:
-    above, below = road(-100.0, 100.0, 6.0, own_is_above), crossing_road(0.0, not own_is_above)
-    own, other = (above, below) if own_is_above else (below, above)
-    kept_own, kept_other = surface.own_level([own, other])
-    assert kept_own is own
-    assert kept_other.shape.distance(own.shape) == pytest.approx(1.2, abs=0.05)
-    assert len(shapely.get_parts(kept_other.shape)) == 2  # one piece on either side
-
-
-def test_levels__roads_that_meet_at_one_height_stay_whole() -> None:
-    parts = [road(-100.0, 100.0, 2.0, True), crossing_road(0.0, False)]
-    assert all(kept is part for kept, part in zip(surface.own_level(parts), parts, strict=True))
-
-
 def test_levels__only_the_overlap_that_differs_in_height_is_cut() -> None:
     """A ramp leaves the own road at its height, climbs in a loop, and crosses it above."""
     ramp_line = np.array([[0.0, 3.0, 0.0], [80.0, 30.0, 3.0], [120.0, 0.0, 6.0], [120.0, -60.0, 6.0]])

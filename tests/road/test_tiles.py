@@ -44,13 +44,12 @@ def test_tiles__are_side_by_side_with_prefixed_names(merge: OpenScene, written: 
     assert lanes[1].getShape()[0][1] - lanes[0].getShape()[0][1] == pytest.approx(offset_m)
 
 
-def test_cache__has_a_net_for_each_number_of_games(merge: OpenScene, written: list[int]) -> None:
+def test_cache__has_a_net_for_each_number_of_games_and_each_choice_of_junctions(
+    merge: OpenScene, written: list[int]
+) -> None:
     files = [tiles.tiled_net(merge.net_file, games) for games in (2, 3, 2)]
     assert files[0] == files[2] != files[1]
     assert written == [2, 3]
-
-
-def test_cache__has_a_net_for_each_choice_of_junctions(merge: OpenScene, written: list[int]) -> None:
     files = [tiles.tiled_net(merge.net_file, 1, each) for each in ({"start"}, {"finish"}, {"start"})]
     assert files[0] == files[2] != files[1]
     assert merge.net_file not in files

@@ -13,7 +13,6 @@ import pytest
 
 from harness.environments.arena import Arena, Seat
 from harness.errors import SimulationError, UsageError
-from harness.game.arrays import FloatArray
 from harness.game.observation_layout import LAYOUT, in_units
 from harness.game.seeding import generator_of
 from harness.road.demand import warm_up
@@ -140,27 +139,6 @@ def test_first_observation__shows_the_vehicles_of_the_warm_up(scene: OpenScene) 
     assert seen["other0_ahead_m"] == pytest.approx(40.0 - 3.0, abs=1e-3)  # to the middle of the van
     assert seen["leader_gap_m"] == pytest.approx(40.0 - 6.0 - 2.3, abs=1e-3)
     assert seen["leader_mps"] == pytest.approx(van.motion.speed_mps - 10.0, abs=1e-3)
-
-
-def test_first_observation__is_the_same_in_a_game_among_others(scene: OpenScene) -> None:
-    starts, departures = [drawn(scene, k) for k in range(3)], [scene.departures(generator_of(k)) for k in range(3)]
-
-    def first_observations(games: Sequence[int], *, recorded: bool, again: int) -> FloatArray:
-        with closing(Arena(scene, len(games), [Seat(Steady()), Seat(Steady())], recorded=recorded)) as arena:
-            arena.reset(
-                {k: starts[game] for k, game in enumerate(games)}, {k: departures[game] for k, game in enumerate(games)}
-            )
-            for _ in range(5):
-                arena.step()
-            arena.reset({again: starts[games[again]]}, {again: departures[games[again]]})
-            return arena.observation[again]
-
-    alone, among = (
-        first_observations([1], recorded=True, again=0),
-        first_observations([0, 1, 2], recorded=False, again=1),
-    )
-    assert alone[:, LAYOUT.index("other1_seen")].any()  # a vehicle, beside the other player
-    np.testing.assert_array_equal(alone, among)
 
 
 def test_trace__has_the_vehicles_from_the_first_sample_on(scene: OpenScene) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from harness.road.net.zebra import stripes
+from harness.road.net.walker_conflicts import stripes
 from harness.road.scene.open_scene import open_scene
 from tests.support.repository import REPOSITORY
 

@@ -99,7 +99,6 @@ def check_departures(
 def _end_problems(
     file: str, key: str, departure: Departure, *, first: Edge, last: Edge, routes: RouteFile
 ) -> Iterator[Problem]:
-    """The problems of a departure's lane, position and speed on its first edge, and on arrival on its last edge."""
     most_mps = routes.types[departure.vehicle_type].max_speed_mps
     factor = max(departure.speed_factor * _ROUNDED, 1.0) if departure.speed_factor else 1.0
     fastest_mps = min(first.getSpeed() * factor, most_mps)

@@ -106,7 +106,6 @@ def _find(
 
 
 def _answers(net_file: Path, route_path: Path, queries: Sequence[_Query]) -> dict[_Query, tuple[str, ...]]:
-    """The routes that duarouter finds, from the cache if it has them."""
     version = importlib.metadata.version("eclipse-sumo")
     content = net_file.read_bytes() + json.dumps([version, queries]).encode()
     cache = Path(platformdirs.user_cache_dir("harness")) / "trips" / f"{hashlib.sha256(content).hexdigest()[:24]}.json"

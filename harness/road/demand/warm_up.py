@@ -77,7 +77,6 @@ def snapshots(document: Scene, routes: RouteFile, net_file: Path) -> tuple[Snaps
 
 
 def _drawn(document: Scene, routes: RouteFile, players: set[str], k: int) -> tuple[float, list[Departure]]:
-    """The density of a snapshot and the departures of its warm-up."""
     generator = generator_of("warm-up", k)
     varied = document.varies.traffic_density
     density = 1.0 if varied is None else between(varied, generator.random())
@@ -102,7 +101,6 @@ def _options(document: Scene) -> tuple[str, ...]:
 def _run(
     departures: Sequence[Departure], k: int, *, routes: RouteFile, net_file: Path, options: Sequence[str]
 ) -> list[Departure]:
-    """The vehicles on the road at the end of a warm-up with these departures."""
     if not departures:
         return []
     with tempfile.TemporaryDirectory(prefix="harness-warm-up-") as name:
@@ -154,7 +152,6 @@ def _is_parked(state: ElementTree.Element) -> bool:
 def _vehicle(
     state: ElementTree.Element, moving: ElementTree.Element, departure: Departure, *, routes: RouteFile, end_s: float
 ) -> Departure:
-    """The departure of a vehicle at the beginning of a game, from SUMO's state and its motion."""
     lane, passed = moving.attrib["lane"], int(state.attrib["state"].split()[2])
     edges = departure.edges[passed:]
     if not lane.startswith(":") and lane.rpartition("_")[0] != edges[0]:

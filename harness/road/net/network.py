@@ -111,7 +111,6 @@ def junctions_near(net: Net, own: Collection[Edge]) -> frozenset[str] | None:
 
 
 def _near(net: Net, own: Collection[Edge]) -> list[Edge]:
-    """The edges that are within `KEPT_M` of the edges `own`, in the net's order."""
     lines = {edge: [shapely.LineString(lane_line(lane)) for lane in edge.getLanes()] for edge in net.getEdges()}
     around = shapely.union_all([line for edge in own for line in lines[edge]])
     shapely.prepare(around)
@@ -193,7 +192,6 @@ def _stretch(net: Net, lane: Lane, *, ahead: bool) -> FloatArray:
 
 
 def _incoming(lane: Lane) -> list[Connection]:
-    """The connections from other edges to a lane."""
     incoming = lane.getEdge().getIncoming().items()
     return [link for edge, links in incoming if not edge.isSpecial() for link in links if link.getToLane() is lane]
 
@@ -257,9 +255,9 @@ def find_lane(net: Net, path: Path, key: str, name: str) -> Lane:
 
 def _is_fringe(edge: Edge, at_end: bool) -> bool:
     """Whether the scene ends at this end of the edge: only the opposite edge is connected there."""
-    if at_end:
-        return all(_is_opposite(edge, other) for other in edge.getToNode().getOutgoing() if not other.isSpecial())
-    return all(_is_opposite(other, edge) for other in edge.getFromNode().getIncoming() if not other.isSpecial())
+    others = edge.getToNode().getOutgoing() if at_end else edge.getFromNode().getIncoming()
+    pairs = [(edge, other) if at_end else (other, edge) for other in others if not other.isSpecial()]
+    return all(_is_opposite(*pair) for pair in pairs)
 
 
 def _is_opposite(edge: Edge, other: Edge) -> bool:
@@ -285,7 +283,6 @@ def _turnarounds_outside(net: Net) -> set[str]:
 
 
 def _cross_section(lane: Lane, at_end: bool) -> FloatArray:
-    """[2, 2] line across a lane's start or end."""
     line = lane_line(lane)
     end, inner = (line[-1], line[-2]) if at_end else (line[0], line[1])
     along = (end - inner) / max(float(np.linalg.norm(end - inner)), 1e-9)

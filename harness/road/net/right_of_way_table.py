@@ -174,7 +174,6 @@ def yields_to(own: Connection, foe: Connection) -> tuple[bool, bool]:
 
 
 def _extent(line: shapely.LineString, overlap: BaseGeometry) -> tuple[float, float]:
-    """The first and the last position along a line of the points of an area."""
     places = shapely.line_locate_point(line, shapely.points(shapely.get_coordinates(overlap)))
     return float(places.min()), float(places.max())
 

@@ -137,7 +137,6 @@ def route_table(
 
 
 def _pieces(net: Net, edges: Sequence[Edge], lanes_of: LanesOf) -> list[_Piece]:
-    """The pieces of a route: edge, junction, edge, ..., edge."""
     links = _links(edges, lanes_of)
     entries = [link.getToLane() for link in links]
     exits = [link.getFromLane() for link in links]

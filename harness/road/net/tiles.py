@@ -89,7 +89,6 @@ def _written(attributes: dict[str, str]) -> str:
 
 
 def _cut(root: ElementTree.Element, kept: set[str]) -> Iterator[ElementTree.Element]:
-    """The elements of a net that belong to junctions, in the net's order."""
     ends = {edge.get("id", ""): (edge.get("from"), edge.get("to")) for edge in root.findall("edge")}
     edges = {name for name, both in ends.items() if kept & set(both) or _junction_of(name) in kept}
     outer = {end for name in edges for end in ends[name] if end} - kept
@@ -129,7 +128,6 @@ def _junction_of(inside: str) -> str:
 
 
 def _dead_end(junction: ElementTree.Element, edges: Collection[str]) -> ElementTree.Element:
-    """The junction at which the cut net ends."""
     lanes = [lane for lane in junction.get("incLanes", "").split() if lane.rsplit("_", 1)[0] in edges]
     incoming = [lane for lane in lanes if not lane.startswith(":")]
     changes = {"type": "dead_end", "incLanes": " ".join(incoming), "intLanes": ""}

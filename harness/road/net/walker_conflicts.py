@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 from sumolib.net import Net
 
 from harness.config.road_user import WALKER_WIDTH_M
@@ -24,13 +25,15 @@ from harness.road.net.meeting import route_points
 from harness.road.net.network import lane_line
 from harness.road.net.route_table import line_over_junction
 from harness.road.net.stream import CORRIDOR_M, USERS, Feeders, Piece, Stream, carries_traffic, samples_on
-from harness.road.net.zebra import follows_crossing
 
 WALKERS_STREAM_M = 3.0
 """Width of a way: a walker that is farther beside it is not in its stream."""
 _WALKER_M = WALKER_WIDTH_M + 0.5  # what a walker needs
 _NEAR_M = 10.0  # lines that are farther apart have no corridors that overlap
 _BEFORE_CROSSING_M = 1.0  # a vehicle waits this far before a way
+_STRIPE_M, _LONG_M = 0.5, 4.0  # of a stripe: along the way, and across it
+_LEAST_M = 1.0  # of the carriageway on a way
+_FOLLOWED_SHARE = 0.5  # of the length of a crossing
 _CORRIDOR_STYLE: dict[str, Any] = {"cap_style": "flat", "join_style": "mitre"}
 
 
@@ -141,7 +144,6 @@ def _zones(
 
 
 def _row(player: int, stream: int, zone: _Zone, *, yields: bool, before_m: float) -> dict[str, Any]:
-    """A row of `Conflicts`."""
     return {
         "player": player,
         "stream": stream,
@@ -162,3 +164,36 @@ def _row(player: int, stream: int, zone: _Zone, *, yields: bool, before_m: float
         "length_m": zone.other_end_m - zone.other_m,
         "across": False,
     }
+
+
+# --- marked crossings ------------------------------------------------------------------------------------------------
+
+
+def follows_crossing(net: Net, way: shapely.LineString) -> bool:
+    """Whether a way crosses a road on a crossing of the net: it keeps to the crossing for most of its length."""
+    for edge in net.getEdges(withInternal=True):
+        if edge.getFunction() == "crossing":
+            line = shapely.LineString(lane_line(edge.getLane(0)))
+            area = line.buffer(0.5 * edge.getLane(0).getWidth(), cap_style="flat")
+            if way.intersection(area).length > _FOLLOWED_SHARE * line.length:
+                return True
+    return False
+
+
+def stripes(ways: Sequence[FloatArray], carriageway: BaseGeometry) -> Iterator[FloatArray]:
+    """The corners [5, 2] of each stripe where ways [n, 2] pass the carriageway: half of its width is painted."""
+    for way in ways:
+        for part in shapely.get_parts(shapely.intersection(shapely.LineString(way), carriageway)):
+            if part.length >= _LEAST_M:
+                yield from _painted(shapely.get_coordinates(part))
+
+
+def _painted(ends: FloatArray) -> Iterator[FloatArray]:
+    line = shapely.LineString(ends)
+    for station_m in np.arange(_STRIPE_M, line.length, 2.0 * _STRIPE_M):
+        near, far = (
+            shapely.get_coordinates(line.interpolate(station_m + side * 0.5 * _STRIPE_M))[0] for side in (-1.0, 1.0)
+        )
+        along = (far - near) / np.hypot(*(far - near))
+        across = 0.5 * _LONG_M * np.array([-along[1], along[0]])
+        yield np.array([near - across, far - across, far + across, near + across, near - across])

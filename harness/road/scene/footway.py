@@ -21,8 +21,7 @@ from harness.road.net import surface
 from harness.road.net.network import lane_line
 from harness.road.net.route_table import extended, road_edges, sampled
 from harness.road.net.stream import USERS
-from harness.road.net.walker_conflicts import WalkersWay, ways_of
-from harness.road.net.zebra import follows_crossing, stripes
+from harness.road.net.walker_conflicts import WalkersWay, follows_crossing, stripes, ways_of
 from harness.road.scene.open_player import OpenPlayer
 from harness.road.scene.scene_files import SceneFiles
 
@@ -79,7 +78,6 @@ def opened_ground(document: Scene, net: Net, carriageway: BaseGeometry) -> Groun
 
 
 def _pavements(net: Net) -> list[BaseGeometry]:
-    """The areas for pedestrians: lanes, crossings and walking areas."""
     shapes: list[BaseGeometry] = []
     for edge in net.getEdges(withInternal=True):
         for lane in edge.getLanes():

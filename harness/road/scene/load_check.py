@@ -72,7 +72,6 @@ def _write_vehicles(scene: OpenScene, file: Path) -> int:
 
 
 def _complaint(run: subprocess.CompletedProcess[str]) -> str:
-    """The error messages of a program; empty if it ended without error."""
     if run.returncode == -getattr(signal, "SIGXFSZ", 0):  # the disk or its quota is full: not an error of the scene
         raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
     if run.returncode < 0:

@@ -52,41 +52,35 @@ def open_player(role: str, files: SceneFiles, area: BaseGeometry) -> OpenPlayer:
     edges = collect(problems, lambda: edges_of(vehicle, net, routes)) if vehicle else None
     if problems or goal is None or vehicle is None or edges is None:
         raise UsageError(problems)
-    first = 0
     if isinstance(lane, Lane):
         if lane.getEdge() not in edges:
             message = f"{player.lane!r} is not on the route of vehicle {vehicle.name!r}"
             raise UsageError.of(file, f"{role}.lane", message, "choose a lane of one of its edges")
-        first = edges.index(lane.getEdge())
-    route_edges = edges[first:]
-    if goal not in route_edges:
+        edges = edges[edges.index(lane.getEdge()) :]
+    if goal not in edges:
         key, each = document.goal_of(player)
-        message = (
-            f"edge {each.edge!r} is not on the route of vehicle {vehicle.name!r} in {routes.path.name}, after its start"
-        )
-        names = ", ".join(edge.getID() for edge in route_edges[-3:])
-        raise UsageError.of(
-            file, f"{key}.edge", message, f"choose one of its edges (it ends with {names}), or give {role} a goal"
-        )
-    length_m = sum(each.getLength() for each in route_edges)
+        on_route = f"is not on the route of vehicle {vehicle.name!r} in {routes.path.name}, after its start"
+        names = ", ".join(edge.getID() for edge in edges[-3:])
+        remedy = f"choose one of its edges (it ends with {names}), or give {role} a goal"
+        raise UsageError.of(file, f"{key}.edge", f"edge {each.edge!r} {on_route}", remedy)
+    length_m = sum(each.getLength() for each in edges)
     key = f"vehicle {vehicle.name}"
     if length_m > _LONGEST_ROUTE_M:
         message = f"its route is {length_m / 1e3:,.0f} km long, up to {_LONGEST_ROUTE_M / 1e3:g} km are possible"
         raise UsageError.of(routes.path, key, message, "remove edges from the route")
-    _check_kind(routes, player, vehicle, route_edges)
+    _check_kind(routes, player, vehicle, edges)
     goal_position_m = document.goal_of(player)[1].position_m
     try:
         lanes_of = lanes_for(player.kind)
-        route = route_table(net, area, route_edges, goal=goal, goal_position_m=goal_position_m, lanes_of=lanes_of)
+        route = route_table(net, area, edges, goal=goal, goal_position_m=goal_position_m, lanes_of=lanes_of)
     except ValueError as error:
         raise UsageError.of(routes.path, key, f"its route {error}", "correct the route's edges") from None
     vehicle_type = routes.types[vehicle.vehicle_type]
     _check_room_beyond_goal(file, document, player=player, route=route, vehicle_type=vehicle_type)
-    return OpenPlayer(route=route, edges=tuple(edge.getID() for edge in route_edges), vehicle_type=vehicle_type)
+    return OpenPlayer(route=route, edges=tuple(edge.getID() for edge in edges), vehicle_type=vehicle_type)
 
 
 def _check_kind(routes: RouteFile, player: Player, vehicle: Departure, edges: Sequence[Edge]) -> None:
-    """Raise UsageError for a bicycle whose vehicle type is another one, or whose route forbids bicycles."""
     if player.kind not in CYCLING:
         return
     key, type_name = f"vehicle {vehicle.name}", vehicle.vehicle_type

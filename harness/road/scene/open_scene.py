@@ -22,9 +22,8 @@ from harness.road.demand.route_file import Departure, RouteFile
 from harness.road.demand.warm_up import Snapshot, snapshots
 from harness.road.net import network
 from harness.road.net.levels import heights_of_players_roads
-from harness.road.scene.blocked_lanes import LaneStrip, strips_near
 from harness.road.scene.footway import opened_ground
-from harness.road.scene.open_obstacles import open_obstacles, with_types
+from harness.road.scene.open_obstacles import LaneStrip, open_obstacles, strips_near, with_types
 from harness.road.scene.scene_files import read_scene
 from harness.road.scene.scene_world import edges_of_players, opened_players, start_places, world_of
 from harness.road.scene.start_ranges import check_starts, start_warnings

@@ -79,7 +79,6 @@ def _net(path: Path, folder: Path) -> Net:
 
 
 def _routes(paths: Sequence[Path], folder: Path, document: Scene | None, ego_type: str | None) -> RouteFile:
-    """The route files of a scene as one, the ego with another vehicle type if one is given."""
     for path in paths:
         _check_within(path, folder)
     routes = read_route_file(*paths)
@@ -93,7 +92,6 @@ def _routes(paths: Sequence[Path], folder: Path, document: Scene | None, ego_typ
 
 
 def _check_within(path: Path, folder: Path) -> None:
-    """Raise UsageError if a path is a link that leads out of the folder."""
     if leads_out(path, folder):
         message = "is a link that leads out of the scene's folder"
         raise UsageError.of(path, "", message, "replace the link by a copy of its target")

@@ -64,7 +64,6 @@ def _on_lane(role: str, files: SceneFiles, lane: Lane, route: Route) -> StartRan
 
 
 def _beside_ego(role: str, files: SceneFiles, lane: Lane) -> tuple[float, float]:
-    """The range of positions along its lane of a player that starts beside the ego."""
     file, document = files.file, files.document
     ego_m, ego_lane_name = document.ego.position_m, document.ego.lane
     assert ego_m is not None, "the document says that the ego has a position"
