@@ -61,10 +61,6 @@ class _Search:
     def _tables(self) -> RightOfWay:
         return self.q.world.right_of_way
 
-    @property
-    def _step_s(self) -> float:
-        return self.q.world.step_s
-
     @cached_property
     def _front_m(self) -> FloatArray:
         """[T] station of the player's front while it drove; NaN otherwise."""
@@ -78,7 +74,7 @@ class _Search:
         there = Places(*places(tuple(q.bodies), tuple(self._tables.streams)))
         for c in np.flatnonzero(conflicts.player == self.player).tolist():
             zone_m = (conflicts.begin_m[c], conflicts.end_m[c])
-            own = own_passage(self._front_m, speed_mps, zone_m, length_m=length_m, step_s=self._step_s)
+            own = own_passage(self._front_m, speed_mps, zone_m, length_m=length_m, step_s=self.q.world.step_s)
             if own is None or not conflicts.right_m[c] <= offset_m[self._step_of(own)] <= conflicts.left_m[c]:
                 continue
             in_stream = (there.stream == conflicts.stream[c]) & (there.body != self.player)
@@ -88,7 +84,7 @@ class _Search:
 
     def _step_of(self, own: Passage) -> int:
         """The first step in which the player is in the zone."""
-        return min(int(np.ceil(own.enters_s / self._step_s - 1e-9)), len(self.drove) - 1)
+        return min(int(np.ceil(own.enters_s / self.q.world.step_s - 1e-9)), len(self.drove) - 1)
 
     def _encounter(self, c: int, own: Passage, body: int, steps: IntArray, along_m: FloatArray) -> Iterator[Encounter]:
         q, conflicts = self.q, self._tables.conflicts
@@ -98,7 +94,7 @@ class _Search:
         if not len(steps) or not self._follows(c, body, steps, along_m, speed_mps):
             return
         zone_m = (conflicts.zone_m[c], conflicts.zone_m[c] + conflicts.length_m[c])
-        other = other_passage(steps, along_m, speed_mps, zone_m, length_m=length_m, step_s=self._step_s)
+        other = other_passage(steps, along_m, speed_mps, zone_m, length_m=length_m, step_s=self.q.world.step_s)
         gap_s = self._gap_s(own, other, steps, conflicts.zone_m[c] - along_m - 0.5 * length_m, speed_mps)
         if other is not None or gap_s < np.inf:
             own_signal = self._signal(
@@ -113,7 +109,7 @@ class _Search:
         """Whether a body in the stream of conflict `c` in `steps` [N] follows it: it comes in before the junction, and
         does not leave it before the end of the zone. Its first and last step in the game are no such moments."""
         present, conflicts = self.q.bodies.present[:, body], self._tables.conflicts
-        reach_m = speed_mps * self._step_s  # in a step
+        reach_m = speed_mps * self.q.world.step_s  # in a step
         there = np.flatnonzero(present)
         comes_in = along_m[0] <= reach_m[0] or steps[0] == there[0]
         end_m = min(conflicts.zone_m[c] + conflicts.length_m[c], conflicts.until_m[c])

@@ -20,9 +20,9 @@ _NOTES = """
 ## The measures of severity
 
 They are computed from oriented boxes at any angle, not along lanes. `pytest tests/evaluation/test_severity.py`
-compares them with cases computed by hand. Masses are those of SUMO's vehicle classes
-(`harness/evaluation/severity/masses.py`); thresholds are in `harness/evaluation/severity/limits.py`. In a bend, a
-course of constant heading leaves the lane: TTC is that of a car that does not steer.
+compares them with cases computed by hand. Thresholds, and the masses of SUMO's vehicle classes, are in
+`harness/evaluation/severity/limits.py`. In a bend, a course of constant heading leaves the lane: TTC is that of a car
+that does not steer.
 
 `python -m benchmarks.criticality` compares them with commonroad-crime 0.4.5, whose measures follow lanes; the script
 says how. Of 511 moments in 50 games of `naive_vs_speedy`, training seed 1, commonroad-crime has a TTC at 4, all above a

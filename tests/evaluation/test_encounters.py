@@ -25,7 +25,7 @@ from harness.game.junctions import Control
 from harness.game.world import World
 from harness.road.scene.open_scene import OpenScene
 from tests.support.conflicts import CROSSING, with_conflicts
-from tests.support.traces import game
+from tests.support.traces import game, rows
 
 STEPS = 60
 KINDS = {"car": BodyKind(length_m=4.6)}
@@ -38,23 +38,11 @@ def driving(
     """A car's rows: straight on from a place, at a speed or the speeds of every step."""
     speeds = np.broadcast_to(np.asarray(speed_mps, dtype=float), STEPS)
     way_m = np.concatenate(([0.0], np.cumsum(speeds[1:]) * 0.1))
-    columns: dict[str, Any] = {
-        "episode": 0,
-        "step": np.arange(STEPS),
-        "time_s": np.arange(STEPS) * 0.1,
-        "player": name,
-        "vehicle_type": "car",
-        "x_m": x_m + way_m * np.cos(heading_rad),
-        "y_m": y_m + way_m * np.sin(heading_rad),
-        "heading_rad": heading_rad,
-        "speed_mps": speeds,
-        "acceleration_mps2": 0.0,
-        "steering_rad": 0.0,
-        "lapsed": False,
-        "outcome": "",
-        "signals": signals,
-    }
-    return pd.DataFrame(columns)
+    poses = [
+        (x_m + way * np.cos(heading_rad), y_m + way * np.sin(heading_rad), heading_rad, speed)
+        for way, speed in zip(way_m, speeds, strict=True)
+    ]
+    return pd.DataFrame(rows(name, poses)).assign(signals=signals)
 
 
 def ego(x_m: float = 67.7, **more: Any) -> pd.DataFrame:

@@ -17,7 +17,7 @@ from harness.environments.recorded import kinds_of
 from harness.evaluation.measured_game import METRICS_OF_GAMES, measured
 from harness.evaluation.recorded_game import BodyKind
 from harness.evaluation.severity.contact import impact_angle_rad, needed_braking_mps2, post_encroachment_s
-from harness.evaluation.severity.masses import mass_kg
+from harness.evaluation.severity.limits import mass_kg
 from harness.evaluation.severity.measures import side_of
 from harness.game.geometry import Box
 from harness.game.sight import Hiding

@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
+from operator import attrgetter
 from typing import Any, Literal
 
 import numpy as np
@@ -92,11 +93,6 @@ class Evidence:
         """The rows of summary.csv by arm and seed."""
         return {(row["arm"], row["seed"]): row for row in self.summary.to_dict("records")}
 
-    @cached_property
-    def games(self) -> Mapping[Any, pd.DataFrame]:
-        """The rows of episodes.csv by arm and seed."""
-        return games_by_arm(self.episodes)
-
     def unanswered(self, persona: str, seed: int) -> bool:
         """Whether a question is not answered, because a player can't drive the scene: its row states a reason."""
         asked = (self.comparisons["persona"] == persona) & (self.comparisons["seed"] == seed)
@@ -139,12 +135,10 @@ def judge(
 
 def worst_of_each(checks: Sequence[Check]) -> list[Check]:
     """For each bound and persona the check with the largest excess, in the order of the checks."""
-    worst: dict[tuple[str, str], Check] = {}
+    groups: dict[tuple[str, str], list[Check]] = {}
     for check in checks:
-        known = worst.setdefault((check.bound, check.persona), check)
-        if check.excess > known.excess:
-            worst[check.bound, check.persona] = check
-    return list(worst.values())
+        groups.setdefault((check.bound, check.persona), []).append(check)
+    return [max(group, key=attrgetter("excess")) for group in groups.values()]
 
 
 def judged_ego(judged: JudgedEgo, persona: str, seed: int, evidence: Evidence) -> EgoStrategy:
@@ -216,7 +210,7 @@ def _preventable(arm: str, seed: int, evidence: Evidence) -> Measured:
 
 def _speed_loss(subject: Subject, evidence: Evidence) -> Measured:
     naive, judged = (against_persona(ego, subject.persona).name for ego in (NaiveEgo(), subject.ego))
-    before, after, _ = pairs_of(evidence.games, subject.seed, naive, judged, ["ego_mean_speed_mps"])
+    before, after, _ = pairs_of(games_by_arm(evidence.episodes), subject.seed, naive, judged, ["ego_mean_speed_mps"])
     losses = (before - after)[:, 0]
     value = float(losses.mean()) if len(losses) else np.nan
     _, high = mean_interval(losses)

@@ -116,14 +116,6 @@ def mean_interval(values: FloatArray) -> tuple[float, float]:
     return float(mean - half_width), float(mean + half_width)
 
 
-def rate_interval(successes: int, games: int) -> tuple[float, float]:
-    """Two-sided 95 % Clopper-Pearson interval of a rate; NaN, NaN without games."""
-    if games == 0:
-        return np.nan, np.nan
-    interval = scipy.stats.binomtest(successes, games).proportion_ci(CONFIDENCE, method="exact")
-    return float(interval.low), float(interval.high)
-
-
 def mean_cells(name: str, values: FloatArray) -> dict[str, float]:
     """The mean of values [N] with the ends of its interval, as the cells of three columns; NaN without values."""
     low, high = mean_interval(values)
@@ -131,9 +123,12 @@ def mean_cells(name: str, values: FloatArray) -> dict[str, float]:
 
 
 def rate_cells(name: str, successes: float, games: int) -> dict[str, float]:
-    """A rate with the ends of its interval, as the cells of three columns; NaN without games."""
-    low, high = rate_interval(int(successes), games)
-    return {name: successes / games if games else np.nan, f"{name}_low": low, f"{name}_high": high}
+    """A rate with the ends of its two-sided 95 % Clopper-Pearson interval, as the cells of three columns; NaN without
+    games."""
+    if games == 0:
+        return dict.fromkeys((name, f"{name}_low", f"{name}_high"), np.nan)
+    interval = scipy.stats.binomtest(int(successes), games).proportion_ci(CONFIDENCE, method="exact")
+    return {name: successes / games, f"{name}_low": float(interval.low), f"{name}_high": float(interval.high)}
 
 
 def _row(question: Question, metric: str, games: Mapping[Any, pd.DataFrame], closed: Gate) -> dict[str, object]:

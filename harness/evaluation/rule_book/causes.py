@@ -25,8 +25,8 @@ import numpy as np
 
 from harness.evaluation.rule_book import thresholds as at
 from harness.evaluation.rule_book.course import Course
-from harness.evaluation.rule_book.driving_rules import RULES_OF_THE_ROAD, drifts, swerves
 from harness.evaluation.rule_book.lane_entries import WALKS, entries, in_lane, moves_of, words_of
+from harness.evaluation.rule_book.named_manoeuvres import RULES_OF_THE_ROAD, drifts, swerves
 from harness.game.arrays import BoolArray
 from harness.game.geometry import box_distance
 from harness.game.outcome import Outcome

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 CONFLICT_TTC_S = 1.5
 """A time to collision up to this is a conflict. Surrogate Safety Assessment Model, its default (Gettman, Pu, Sayed and
@@ -23,3 +24,29 @@ NEEDED_WITHIN_S = 4.0
 and collision avoidance systems": 4 s separates drivers in danger from drivers in control."""
 LEADER_TURNED_RAD = math.radians(90.0)
 """A road user at a larger angle to the way crosses it, and is not followed. Our own."""
+_PERSON_KG = 70.0
+_CAR_KG = 1500.0
+MASS_KG: Mapping[str, float] = {
+    "pedestrian": _PERSON_KG,
+    "wheelchair": 2.0 * _PERSON_KG,
+    "scooter": 10.0 + _PERSON_KG,
+    "bicycle": 10.0 + _PERSON_KG,
+    "moped": 80.0 + _PERSON_KG,
+    "motorcycle": 200.0 + _PERSON_KG,
+    "passenger": _CAR_KG,
+    "delivery": 5000.0,
+    "emergency": 5000.0,
+    "truck": 4500.0,
+    "trailer": 13_000.0,
+    "bus": 12_000.0,
+    "coach": 25_000.0,
+    "tram": 37_900.0,
+}
+"""kg, by SUMO vehicle class; a class without an entry has the mass of a passenger car. Source: the default masses of
+SUMO 1.28 ("Vehicle Type Parameter Defaults"), which are those of the bare vehicle. Two wheels have a rider in addition,
+of the mass that SUMO gives a pedestrian. A wheelchair with its user: our own."""
+
+
+def mass_kg(vehicle_class: str) -> float:
+    """The mass of a road user of a class."""
+    return MASS_KG.get(vehicle_class, _CAR_KG)

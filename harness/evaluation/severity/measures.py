@@ -12,7 +12,6 @@ from harness.evaluation.column import MAYBE, TEXT
 from harness.evaluation.metrics import Drive, finite, metric
 from harness.evaluation.severity import contact
 from harness.evaluation.severity import limits as at
-from harness.evaluation.severity.masses import mass_kg
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.bicycle import GRAVITY_MPS2
 from harness.game.geometry import Box
@@ -45,7 +44,7 @@ def impact_of(drive: Drive) -> Impact:
         return Impact()
     relative = game.velocity_mps(last, other) - game.velocity_mps(last, player)
     closing_mps = float(np.hypot(*relative))
-    own_kg, other_kg = (mass_kg(game.body_kinds[body].vehicle_class) for body in (player, other))
+    own_kg, other_kg = (at.mass_kg(game.body_kinds[body].vehicle_class) for body in (player, other))
     if game.names[other] in game.obstacles:
         other_kg = math.inf
     angle_rad = contact.impact_angle_rad(game.box(last, player), game.box(last, other), *relative.tolist())
