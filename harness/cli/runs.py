@@ -40,7 +40,7 @@ def replay(
 ) -> None:
     """Watch a recorded game in SUMO-GUI. Without ARM or EPISODE, list the recorded games."""
     with output(as_json) as console:
-        from harness.campaign.results.replay_game import GameList, film, found_game, game_records, game_table, watch
+        from harness.campaign.results.replay_game import GameList, film, game_records, game_table, played_game, watch
 
         listing = list_games or arm is None or episode is None
         if film_file is not None and listing:
@@ -56,11 +56,11 @@ def replay(
             else:
                 console.print(game_table(run, chosen))
             return
-        with found_game(run, arm, episode, seed) as game:
-            if film_file is None:
-                watch(game, console)
-            else:
-                film(game, film_file, console)
+        game = played_game(run, arm, episode, seed)
+        if film_file is None:
+            watch(game, console)
+        else:
+            film(game, film_file, console)
 
 
 def export(
@@ -94,7 +94,7 @@ def export(
     """
     from rich.console import Console
 
-    from harness.campaign.results.export_games import ChosenFailures, export_failures, export_game
+    from harness.campaign.results.export_games import export_failures, export_game
     from harness.export import Formats
 
     if not (openscenario or opendrive or csv):
@@ -105,8 +105,8 @@ def export(
         if len(rest) > 2:
             message, remedy = "is more than an arm and a new folder", "harness export RUN [ARM] --failures DIR"
             raise UsageError.of("--failures", " ".join(rest), message, remedy)
-        chosen = ChosenFailures(arm=rest[0] if len(rest) == 2 else None, seed=seed)
-        count = export_failures(run, chosen, folder=folder, formats=formats, console=console)
+        arm = rest[0] if len(rest) == 2 else None
+        count = export_failures(run, arm, seed=seed, folder=folder, formats=formats, console=console)
     else:
         if len(rest) != 3:
             remedy = "harness export RUN ARM EPISODE DIR, or harness export RUN --failures DIR"
@@ -165,9 +165,10 @@ def compare(
     from rich.console import Console
 
     from harness.campaign.results.compare_runs import compare_runs
+    from harness.reports.comparison_page import headline
 
-    console = Console()
-    found = compare_runs(before, after, out or after / "compare.html")
-    for row in found.rows:
-        print_plain([f"{row.sentence}, seed {row.seed}"], console, _STYLES[row.tone])
-    print_plain([found.headline, f"Comparison: {found.page}"], console)
+    console, page = Console(), out or after / "compare.html"
+    rows = compare_runs(before, after, page)
+    for row in rows:
+        print_plain([row.sentence], console, _STYLES[row.tone])
+    print_plain([headline(rows), f"Comparison: {page}"], console)

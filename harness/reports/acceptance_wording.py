@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from harness.evaluation.comparisons.acceptance_checks import Check
+from harness.evaluation.comparisons.acceptance_checks import Check, worst_of_each
 from harness.reports.numbers import MISSING, NO_SPACE, SURE, number, percent
 
 PASS, FAIL = "PASS", "FAIL"
@@ -18,9 +18,6 @@ TITLES = {
     "gap_share": "best-response gap of the ego",
 }
 """What each bound limits."""
-SPEEDS = ("speed_loss_mps",)
-NOT_MEASURED = "not measured: {arm} was not played"
-NO_GAMES = "not measured"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,16 +36,23 @@ class Line:
         return f"{PASS if self.passed else FAIL}  {self.title}: {self.sentence}".replace(NO_SPACE, " ")
 
 
-def line(check: Check, seeds: int = 1) -> Line:
-    """A check in words; with several training seeds it names its seed."""
-    seed = f", seed {check.seed}" if seeds > 1 else ""
-    return Line(passed=check.passed, title=f"{TITLES[check.bound]}, {check.persona}{seed}", sentence=sentence(check))
+def acceptance_lines(checks: Sequence[Check], seeds: int) -> list[Line]:
+    """A line for each bound and persona: that of its worst arm and seed. With several training seeds it names its
+    seed."""
+    return [
+        Line(
+            passed=check.passed,
+            title=f"{TITLES[check.bound]}, {check.persona}{f', seed {check.seed}' if seeds > 1 else ''}",
+            sentence=sentence(check),
+        )
+        for check in worst_of_each(checks)
+    ]
 
 
 def sentence(check: Check) -> str:
     """What was measured and where, the end of the interval, and the bound."""
     if not check.measured:
-        return NOT_MEASURED.format(arm=check.arm) if not check.games else NO_GAMES
+        return "not measured" if check.games else f"not measured: {check.arm} was not played"
     value, limit, allowed = (_value(check.bound, each) for each in (check.value, check.limit, check.allowed))
     return (
         f"{value} in {check.games:,} games of {check.arm}; with {SURE} confidence at most {limit}; allowed: {allowed}"
@@ -66,4 +70,4 @@ def headline(checks: Sequence[Check]) -> str:
 def _value(bound: str, value: float) -> str:
     if value != value:
         return MISSING
-    return f"{number(value, 2)}{NO_SPACE}m/s" if bound in SPEEDS else percent(value)
+    return f"{number(value, 2)}{NO_SPACE}m/s" if bound.endswith("_mps") else percent(value)

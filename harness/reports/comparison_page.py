@@ -9,7 +9,7 @@ from typing import Any
 
 from harness.evaluation.comparisons.run_comparison import Difference, Side
 from harness.reports.differences import CHANCE, NO_RELEVANT_DIFFERENCE, RELEVANT_SPEED_MPS
-from harness.reports.numbers import MISSING, NO_SPACE, interval, number, p_number, percent, signed
+from harness.reports.numbers import MISSING, NO_SPACE, interval, number, percent, signed
 from harness.reports.page_template import environment_of
 from harness.reports.provenance import command_of, facts, made_by
 
@@ -24,20 +24,14 @@ DIFFERENT_SCENES = "The scenes differ, so games have different starts: there are
 class ComparedRow:
     """One difference in words."""
 
-    arm: str
-    seed: int
-    measure: str
-    before: str
-    after: str
+    found: Difference
     verdict: str
     tone: str
     sentence: str
+    before: str
+    after: str
     difference: str
     interval: str
-    p_value: str
-    p_holm: str
-    pairs: int
-    """0 without a test."""
 
 
 def compared_rows(differences: Sequence[Difference], significance: float) -> list[ComparedRow]:
@@ -71,7 +65,7 @@ def render_comparison(
             headline=headline(rows),
             remark="" if same_scene else DIFFERENT_SCENES,
             significance=significance,
-            several_seeds=len({row.seed for row in rows}) > 1,
+            several_seeds=len({row.found.seed for row in rows}) > 1,
         )
     )
 
@@ -80,19 +74,14 @@ def _row(found: Difference, significance: float) -> ComparedRow:
     verdict = _verdict(found, significance)
     sentence = f"{found.arm}: {found.measure} {_value(found, found.before)} before, {_value(found, found.after)} after"
     return ComparedRow(
-        arm=found.arm,
-        seed=found.seed,
-        measure=found.measure,
-        before=_with_interval(found, found.before),
-        after=_with_interval(found, found.after),
+        found=found,
         verdict=verdict,
         tone=TONES.get(verdict, "open"),
-        sentence=f"{sentence}: {CHANCE if verdict == NOT_SHOWN else verdict}",
+        sentence=f"{sentence}: {CHANCE if verdict == NOT_SHOWN else verdict}, seed {found.seed}",
+        before=_with_interval(found, found.before),
+        after=_with_interval(found, found.after),
         difference=_with_unit(found, found.mean) if found.pairs else "",
         interval=" to ".join(_with_unit(found, end) for end in _ends(found)) if len(_ends(found)) > 1 else MISSING,
-        p_value=p_number(found.p_value),
-        p_holm=p_number(found.p_holm),
-        pairs=found.pairs,
     )
 
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from harness.evaluation.comparisons.acceptance_checks import worst_of_each
 from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.unplayed_games import reasons_of
-from harness.reports.acceptance_wording import headline, line
+from harness.reports.acceptance_wording import acceptance_lines, headline
 from harness.reports.arm_figures import MOST_DOTS
 from harness.reports.arm_glossary import glossary
 from harness.reports.cards import CAUTION, card
@@ -125,7 +124,7 @@ def _acceptance(tables: RunTables) -> tuple[bool, str, list[Any]] | None:
     """Whether every bound is kept, that in words, and a line for each; None without bounds."""
     if tables.acceptance is None:
         return None
-    lines = [line(check, len(tables.seeds)) for check in worst_of_each(tables.acceptance)]
+    lines = acceptance_lines(tables.acceptance, len(tables.seeds))
     return all(each.passed for each in lines), headline(tables.acceptance), lines
 
 

@@ -20,6 +20,7 @@ from harness.reports.persona.persona_page import render_profile, write_profile
 from harness.reports.persona.persona_terminal import show
 from harness.reports.persona.profile import (
     AFTER_A_LAPSE,
+    ALWAYS_CHECKS,
     ATTENDS,
     COLLISION_IS_FREE,
     DECIDES,
@@ -28,11 +29,8 @@ from harness.reports.persona.profile import (
     UNIMPAIRED_IN_TRAINING,
     WANTS,
     PersonaProfile,
-    attends,
-    body,
     function_in_words,
     persona_profile,
-    wants,
 )
 from tests.support.bicycle import advance, state_of
 from tests.support.chromium import launched, opener
@@ -115,10 +113,10 @@ def test_function__is_that_of_the_game() -> None:
 
 
 def test_wants__compares_a_collision_with_progress() -> None:
-    assert list(wants(profile_of(SPEEDY))) == ["A collision costs as much as 125 m of progress earn."]
-    assert list(wants(invented())) == [COLLISION_IS_FREE]
+    assert profile_of(SPEEDY).wants == ["A collision costs as much as 125 m of progress earn."]
+    assert invented().wants == [COLLISION_IS_FREE]
     of = invented(human={"weight": 0.0, "terms": {"time_pressure": 1.0}}, safety={"terms": {"collision": 5.0}})
-    assert list(wants(of)) == [
+    assert of.wants == [
         "A collision costs 2.5 times the payoff of the goal.",
         "The human terms have no effect: their alpha is 0.",
     ]
@@ -148,20 +146,19 @@ def test_drift__is_that_of_the_games_car() -> None:
 
 
 def test_attends__in_words() -> None:
-    text = " ".join(attends(profile_of(DISTRACTED)))
+    text = " ".join(profile_of(DISTRACTED).attends)
     assert "Eyes off the road 56 % of the time" in text
     assert "lapses of 4 to 6 s, with 4 s of attention between them on average; 6.7 lapses per minute" in text
     assert "Of drives of 60 s, under 1 % have no lapse" in text
     assert "after 5 s, 5.1 m to the right (standard deviation 0.93 m)" in text
-    assert list(attends(profile_of(CAREFUL))) == [NO_LAPSES]
+    assert profile_of(CAREFUL).attends == [NO_LAPSES, ALWAYS_CHECKS]
     straight = invented(attention={"mean_attentive_s": 55.0, "lapse_s": [5.0, 5.0]})
-    text = " ".join(attends(straight))
+    text = " ".join(straight.attends)
     assert "Eyes off the road 8 % of the time, in the long run: lapses of 5 s, with 55 s" in text
     assert STRAIGHT_WHEEL in text
 
 
 def test_body__in_words() -> None:
-    assert list(body(profile_of(CAREFUL))) == []
     of = invented(
         perception={
             "looked_but_failed_to_see_share": 0.3, "noticed_within_m": 8.0, "range_m": 60.0,
@@ -171,7 +168,7 @@ def test_body__in_words() -> None:
         actuators={"throttle_share": 0.5, "steering_share": 0.8},
         attention={"mean_attentive_s": 5.0, "lapse_s": [1.0, 2.0]},
     )  # fmt: skip
-    assert list(body(of)) == [
+    assert of.attends[-9:] == [
         "In 30 % of the drives the person looks but fails to see: a vehicle is noticed within 8 m only.",
         "Vehicles more than 60 m away are never seen.",
         "Two thirds of the time, a distance of 10 m is perceived as 9.05 to 11.1 m.",  # 10 exp(-0.1) to 10 exp(0.1)

@@ -1,4 +1,4 @@
-"""The acceptance of a run: its bounds judged, and the files `junit.xml` and `result.json` for CI."""
+"""The files `junit.xml` and `result.json` of a run, for CI."""
 
 from __future__ import annotations
 
@@ -10,32 +10,13 @@ from typing import Any
 from harness.campaign.results.kept_results import RunResult
 from harness.campaign.storage.manifest import FINISHED, FORMAT
 from harness.campaign.storage.run_folder import RunFolder
-from harness.config.campaign import Campaign
-from harness.evaluation.comparisons.acceptance_checks import Check, Evidence, judge, worst_of_each
+from harness.evaluation.comparisons.acceptance_checks import Check
 from harness.files import write_atomically
 from harness.reports import junit
-from harness.reports.acceptance_wording import TITLES, Line, line
+from harness.reports.acceptance_wording import TITLES, sentence
 from harness.reports.numbers import NO_SPACE
 
 RESULT, JUNIT = "result.json", "junit.xml"
-
-
-def checks_of(campaign: Campaign, personas: Sequence[str], evidence: Evidence) -> list[Check] | None:
-    """Every acceptance check of a run; None if its campaign has no bounds."""
-    if campaign.acceptance is None:
-        return None
-    return judge(
-        campaign.acceptance.bounds,
-        campaign.acceptance.ego,
-        [*personas, *campaign.mixed_people],
-        campaign.seeds,
-        evidence,
-    )
-
-
-def shown_lines(checks: Sequence[Check] | None, seeds: int) -> list[Line]:
-    """A line for each bound and persona: that of its worst arm and seed."""
-    return [line(check, seeds) for check in worst_of_each(checks or ())]
 
 
 def write_ci_files(
@@ -66,20 +47,14 @@ def write_ci_files(
 
 
 def _record(check: Check) -> dict[str, Any]:
+    record = {name: getattr(check, name) for name in ("bound", "persona", "seed", "arm", "games")}
     numbers = {name: getattr(check, name) for name in ("value", "limit", "allowed")}
-    return {
-        "bound": check.bound,
-        "persona": check.persona,
-        "seed": check.seed,
-        "arm": check.arm,
-        "games": check.games,
-        **{name: number if math.isfinite(number) else None for name, number in numbers.items()},
-        "passed": check.passed,
-    }
+    known = {name: number if math.isfinite(number) else None for name, number in numbers.items()}
+    return {**record, **known, "passed": check.passed}
 
 
 def _acceptance_case(check: Check) -> junit.JUnitCase:
-    name, words = f"{TITLES[check.bound]}: {check.arm}, seed {check.seed}", line(check).sentence.replace(NO_SPACE, " ")
+    name, words = f"{TITLES[check.bound]}: {check.arm}, seed {check.seed}", sentence(check).replace(NO_SPACE, " ")
     group = f"acceptance.{check.persona}.{check.bound}"
     return junit.JUnitCase(name=name, group=group, failure="" if check.passed else words, details=words)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import posixpath
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,19 +12,10 @@ from harness.errors import UsageError
 from harness.evaluation.comparisons.run_comparison import differences_of
 from harness.evaluation.tables import read_csv
 from harness.files import write_atomically
-from harness.reports.comparison_page import ComparedRow, compared_rows, headline, render_comparison
+from harness.reports.comparison_page import ComparedRow, compared_rows, render_comparison
 
 
-@dataclass(frozen=True, kw_only=True)
-class RunComparison:
-    """What a comparison found."""
-
-    headline: str
-    rows: list[ComparedRow]
-    page: Path
-
-
-def compare_runs(before: Path, after: Path, page: Path) -> RunComparison:
+def compare_runs(before: Path, after: Path, page: Path) -> list[ComparedRow]:
     """Compare the games of two run folders and write the page. Raises UsageError for a folder that is no run, one
     without games, and a page that can't be written."""
     if not page.absolute().parent.is_dir():
@@ -39,7 +29,7 @@ def compare_runs(before: Path, after: Path, page: Path) -> RunComparison:
     runs = list(zip((str(before), str(after)), manifests, strict=True))
     text = render_comparison(runs, rows, same_scene=same_scene, significance=significance)
     write_atomically(page, text.encode())
-    return RunComparison(headline=headline(rows), rows=rows, page=page)
+    return rows
 
 
 def _scene(manifest: Mapping[str, Any]) -> dict[str, str]:

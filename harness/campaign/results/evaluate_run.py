@@ -10,13 +10,12 @@ import pandas as pd
 
 from harness.campaign.plan.paper_rounds import questions
 from harness.campaign.plan.stages import AssessmentStage, TrainingStage, stage_id
-from harness.campaign.results.ci_files import checks_of
 from harness.campaign.results.matchups import matchups_of
 from harness.campaign.results.population_summary import by_who_drove
 from harness.campaign.results.read_run import ReadRun
 from harness.campaign.storage.learned import judged
 from harness.campaign.storage.manifest import is_tuned
-from harness.evaluation.comparisons.acceptance_checks import Evidence
+from harness.evaluation.comparisons.acceptance_checks import Evidence, judge
 from harness.evaluation.comparisons.comparison import compare, games_by_arm
 from harness.evaluation.comparisons.preventability import count_prevented
 from harness.evaluation.comparisons.summary import summarise
@@ -31,14 +30,10 @@ def evaluated(run: ReadRun) -> RunTables:
     """What a run's report is made of, without its replays."""
     entries = judged(run.manifest["stages"], run.campaign, run.stages, _goals(run))
     manifest = {**run.manifest, "stages": entries}
-    prevented = (
-        {}
-        if run.reference_drivers is None
-        else {
-            "reference_drivers": run.reference_drivers,
-            "preventability": count_prevented(run.reference_drivers, run.episodes),
-        }
-    )
+    prevented = {}
+    if run.reference_drivers is not None:
+        counts = count_prevented(run.reference_drivers, run.episodes)
+        prevented = {"reference_drivers": run.reference_drivers, "preventability": counts}
     tables = RunTables(
         manifest=manifest,
         arms={stage.name: stage.arm for stage in run.stages if isinstance(stage, AssessmentStage)},
@@ -55,6 +50,9 @@ def evaluated(run: ReadRun) -> RunTables:
         populations=by_who_drove(run.campaign, run.episodes),
         **prevented,
     )
+    asked = run.campaign.acceptance
+    if asked is None:
+        return tables
     evidence = Evidence(
         arms=tables.arms,
         episodes=tables.episodes,
@@ -63,7 +61,8 @@ def evaluated(run: ReadRun) -> RunTables:
         gaps=tables.game.gaps if tables.game is not None else table_of("gaps"),
         preventability=tables.preventability if run.reference_drivers is not None else None,
     )
-    return replace(tables, acceptance=checks_of(run.campaign, run.manifest["personas"], evidence))
+    personas = [*run.manifest["personas"], *run.campaign.mixed_people]
+    return replace(tables, acceptance=judge(asked.bounds, asked.ego, personas, run.campaign.seeds, evidence))
 
 
 def csv_tables(run: ReadRun, tables: RunTables) -> dict[str, pd.DataFrame]:

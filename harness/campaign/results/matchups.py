@@ -14,6 +14,8 @@ from harness.evaluation.game_theory.crossplay import Pairing
 from harness.evaluation.strategies import (
     PAPER_ROUNDS,
     Arm,
+    EgoStrategy,
+    NonEgoStrategy,
     ReconfiguredEgo,
     RetrainedEgo,
     RobustEgo,
@@ -53,21 +55,21 @@ def matchups_of(
 
 
 def _pairing(campaign: Campaign, stage: AssessmentStage) -> Pairing:
-    ego, non_ego = _names(stage.arm)
+    ego, non_ego = _pair(stage.arm)
     return Pairing(
         arm=stage.name,
         seed=stage.seed,
-        ego=ego,
-        non_ego=non_ego,
+        ego=strategy_name(ego),
+        non_ego=strategy_name(non_ego),
         persona=stage.persona,
         alone=alone_bounds(campaign, stage.arm),
     )
 
 
-def _names(arm: Arm) -> tuple[str, str]:
+def _pair(arm: Arm) -> tuple[EgoStrategy, NonEgoStrategy]:
     assert arm.ego is not None
     assert arm.non_ego is not None
-    return strategy_name(arm.ego), strategy_name(arm.non_ego)
+    return arm.ego, arm.non_ego
 
 
 def _responses(campaign: Campaign, stages: Sequence[AssessmentStage]) -> list[Response]:
@@ -78,19 +80,17 @@ def _responses(campaign: Campaign, stages: Sequence[AssessmentStage]) -> list[Re
         arm = stage.arm
         if arm.best_response_of is None or (arm.pair, stage.seed) not in done:
             continue
-        assert arm.ego is not None
-        assert arm.non_ego is not None
-        ego, non_ego = _names(arm)
+        ego, non_ego = _pair(arm)
         found.append(
             Response(
                 seed=stage.seed,
                 role=ROLES[arm.best_response_of],  # type: ignore[arg-type]
                 persona=stage.persona,
-                round=max(round_of(arm.ego), round_of(arm.non_ego)),
+                round=max(round_of(ego), round_of(non_ego)),
                 pair_arm=arm.pair.name,
                 response_arm=stage.name,
-                ego=ego,
-                non_ego=non_ego,
+                ego=strategy_name(ego),
+                non_ego=strategy_name(non_ego),
                 alone=alone_bounds(campaign, arm.pair),
             )
         )

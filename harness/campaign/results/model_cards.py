@@ -7,7 +7,6 @@ gives the same card.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import pandas as pd
@@ -29,27 +28,16 @@ from harness.game.human_factors import PERSISTENCE_S
 from harness.game.payoff_terms import GROUPS, TERMS
 from harness.game.roles import NON_EGO, ROLES
 from harness.reports.learning import stopped
-from harness.reports.numbers import interval, number, percent
+from harness.reports.numbers import MISSING, interval, number, percent
 
 CARD = "README.md"
 _PROGRAMS = ("python", "eclipse-sumo", "torch", "stable-baselines3", "numpy")
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Term:
-    """A row of the payoff's table."""
-
-    group: str
-    name: str
-    weight: str
-    counts: str
-    meaning: str
-
-
 def write_model_cards(
     folder: RunFolder, manifest: Mapping[str, Any], policies: Mapping[str, Mapping[str, Any]], summary: pd.DataFrame
 ) -> None:
-    """Write the card of every policy of `policies` (`trained_policies`)."""
+    """Write the card of every policy of `policies`, the policy.json of each training stage."""
     cards = {stage: model_card(stage, manifest, summary, policy) for stage, policy in policies.items()}
     for stage, card in cards.items():
         write_atomically(folder.policy(stage) / CARD, card.encode())
@@ -85,7 +73,9 @@ def model_card(stage: str, manifest: Mapping[str, Any], summary: pd.DataFrame, p
         intervals="Clopper-Pearson of rates" + (", t of speeds" if is_ego else ""),
         headings=_HEADINGS[is_ego],
         figures=list(_figures(stage, manifest, summary, is_ego)),
-        purpose=_purpose(persona, is_ego),
+        purpose="as the ego under study, or for comparison with another ego"
+        if is_ego
+        else f"to test an ego against a driver with the persona `{persona.name}`",
         scene=policy["scene"],
         snippet=_snippet(stage, entry, is_ego),
         settings=[(name, _shown(value)) for name, value in policy["training"].items()],
@@ -183,33 +173,26 @@ def _given(manifest: Mapping[str, Any], campaign: Campaign) -> str:
     return str(recorded["in_words"]) if recorded else f"the policy `{campaign.ego.driver}`"
 
 
-def _limit(key: str) -> str:
-    """A limit of a term in words, with a place for its value: "within {:g} m" for `within_m`."""
-    word, _, unit = key.rpartition("_")
-    return f"{word} {{:g}} {unit.replace('mps', 'm/s')}"
-
-
-def _terms(persona: Persona) -> Iterator[_Term]:
+def _terms(persona: Persona) -> Iterator[Mapping[str, str]]:
+    """The rows of the payoff's table."""
     for group in GROUPS:
         for name, given in getattr(persona, group).terms.items():
-            term, weight, limit = TERMS[name], given, ""
+            term, weight, meaning = TERMS[name], given, TERMS[name].meaning
             if isinstance(given, Parametrised):
                 weight = given.weight
-                limit = "".join(f", {_limit(key)}".format(value) for key, value in given.limits.items())
+                for key, value in given.limits.items():  # such as within_m
+                    word, _, unit = key.rpartition("_")
+                    meaning += f", {word} {value:g} {unit.replace('mps', 'm/s')}"
             counts = "per second" if term.per_second else "per event"
-            yield _Term(group=group, name=name, weight=f"{weight:g}", counts=counts, meaning=term.meaning + limit)
+            yield {"group": group, "name": name, "weight": f"{weight:g}", "counts": counts, "meaning": meaning}
     for each in persona.human.fuzzy:
         sets = "; ".join(
             f"{one.name} ({', '.join(f'{x:g}: {y:g}' for x, y in one.points)}) has the value {one.value:g}"
             for one in each.sets
         )
-        yield _Term(
-            group="human",
-            name=each.name,
-            weight=f"{each.weight:g}",
-            counts="per second",
-            meaning=f"fuzzy, of `{each.quantity}`: {sets}",
-        )
+        meaning = f"fuzzy, of `{each.quantity}`: {sets}"
+        row = {"name": each.name, "weight": f"{each.weight:g}", "counts": "per second", "meaning": meaning}
+        yield {"group": "human", **row}
 
 
 _HEADINGS = {
@@ -234,40 +217,32 @@ def _figures(
 def _of_ego(row: Mapping[Any, Any]) -> Sequence[str]:
     rate = _with(percent(row["failure_rate"]), interval(row["failure_rate_low"], row["failure_rate_high"]))
     low, high = (number(row[f"mean_speed_{end}_mps"], 2) for end in ("low", "high"))
-    speed = _with(number(row["mean_speed_mps"], 2), f"{low}–{high}" if low != "–" else "–")
+    speed = _with(number(row["mean_speed_mps"], 2), MISSING if low == MISSING else f"{low}–{high}")
     return str(row["episodes"] - row["errors"]), rate, speed
 
 
 def _of_non_ego(row: Mapping[Any, Any]) -> Sequence[str]:
     span = interval(row["non_ego_goal_rate_low"], row["non_ego_goal_rate_high"])
     rate = _with(percent(row["non_ego_goal_rate"]), span)
-    return str(row["episodes"] - row["errors"]), rate, number(row["non_ego_mean_speed_mps"], 2).replace("–", "")
+    return str(row["episodes"] - row["errors"]), rate, _with(number(row["non_ego_mean_speed_mps"], 2), MISSING)
 
 
 def _with(value: str, span: str) -> str:
-    if value == "–":
+    """A value with its interval; empty where it can't be measured."""
+    if value == MISSING:
         return ""
-    return value if span == "–" else f"{value} ({span})"
-
-
-def _purpose(persona: Persona, is_ego: bool) -> str:
-    if is_ego:
-        return "For campaigns of this harness: as the ego under study, or for comparison with another ego."
-    return f"For campaigns of this harness: to test an ego against a driver with the persona `{persona.name}`."
+    return value if span == MISSING else f"{value} ({span})"
 
 
 def _snippet(stage: str, entry: Mapping[str, Any], is_ego: bool) -> str:
     if is_ego:
         return f'[ego]\ndriver = "policies/{stage}"    # the path of this folder'
-    lines = [
-        f'personas = ["personas/{entry["persona"]}.toml"]',
-        f"seeds = [{entry['seed']}]",
-        'policies = "policies"    # the path of the parent of this folder',
-        "",
-        "[ego]",
-        'driver = "sumo"          # or the folder of a policy: your own',
-    ]
-    return "\n".join(lines)
+    return f"""personas = ["personas/{entry["persona"]}.toml"]
+seeds = [{entry["seed"]}]
+policies = "policies"    # the path of the parent of this folder
+
+[ego]
+driver = "sumo"          # or the folder of a policy: your own"""
 
 
 def _shown(value: Any) -> str:

@@ -5,23 +5,36 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import pandas as pd
+from pydantic import ConfigDict, Field, ValidationError
 from rich.console import Console
 
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import Stage, stage_id
-from harness.campaign.results.policy_cards import trained_policies
 from harness.campaign.results.shown_work import doing
 from harness.campaign.storage.arm_tables import PLAYED, arm_tables
 from harness.campaign.storage.manifest import is_tuned
 from harness.campaign.storage.run_folder import JUDGED, RunFolder
 from harness.config.campaign import Campaign
+from harness.config.toml_reading import Document
+from harness.drivers.policy_file import policy_files, read_card
 from harness.errors import UsageError
 from harness.evaluation.tables import is_of_a_search, joined, read_csv
 from harness.evaluation.trace_file import check_traces
 from harness.road.scene.open_scene import OpenScene, open_scene
+
+
+class _PolicyCard(Document):
+    """The part of a policy's JSON that a card uses."""
+
+    model_config = ConfigDict(extra="ignore")
+    player: Literal["ego", "non_ego"]
+    scene: str = Field(max_length=1000)
+    against: str | None = Field(max_length=1000)
+    began_from: str | None = Field(max_length=1000)
+    training: dict[str, bool | int | float | str | list[int] | None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +68,8 @@ def read_run(folder: RunFolder, console: Console) -> ReadRun:
         _check_log(folder, stage, manifest["stages"][stage])
     training = joined("training", _gathered(folder, manifest, "training", "training.csv"))
     searches = joined("reconfiguration", _gathered(folder, manifest, "reconfiguration", "reconfiguration.csv"))
-    policies, reference_drivers = trained_policies(folder, manifest), _reference_drivers(folder, manifest)
+    policies = {stage: _policy(folder.policy(stage)) for stage in _done(manifest, "training")}
+    reference_drivers = _reference_drivers(folder, manifest)
     with doing(console, "measuring the games"):
         arms = [arm_tables(folder, stage, scene) for stage in _done(manifest, "assessment")]
     return ReadRun(
@@ -77,6 +91,17 @@ def _done(manifest: Mapping[str, Any], kind: str) -> list[str]:
     """The stages of a kind that are done."""
     entries = manifest["stages"].items()
     return [name for name, entry in entries if entry["kind"] == kind and entry["status"] == "done"]
+
+
+def _policy(folder: Path) -> dict[str, Any]:
+    """The content of a policy's JSON. Raises UsageError where it does not have the form that a training writes."""
+    card = read_card(folder)
+    try:
+        _PolicyCard.model_validate(card)
+    except ValidationError as error:
+        key, message = ".".join(map(str, error.errors()[0]["loc"])), error.errors()[0]["msg"]
+        raise UsageError.of(policy_files(folder)[0], key, f"is damaged: {message}", "train the policy again") from None
+    return card
 
 
 def _check_log(folder: RunFolder, stage: str, entry: Mapping[str, Any]) -> None:

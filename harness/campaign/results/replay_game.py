@@ -13,18 +13,18 @@ from typing import Any
 import pandas as pd
 from rich.box import SIMPLE
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
 from harness.campaign.plan.stages import stage_id
+from harness.campaign.results.shown_work import progress_bar
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.toml_reading import nearest
 from harness.errors import UsageError, plain
 from harness.evaluation.people import people_in
 from harness.evaluation.rule_book.cause_lines import causes_in_words
 from harness.evaluation.tables import read_csv
-from harness.evaluation.trace_file import read_trace
+from harness.evaluation.trace_file import TraceReader
 from harness.evaluation.worst_first import FAILURES, worst_first
 from harness.replay import follow_in_sumo_gui, names_in_pictures, replay_name, write_film, write_replay
 from harness.replay.vehicles import legend
@@ -49,8 +49,8 @@ class GameList:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ListedGames:
-    """Games of a run, worst first: a page of them."""
+class _Page:
+    """A page of a list of games, worst first."""
 
     games: pd.DataFrame
     """Of episodes.csv: arm, seed, episode, an outcome per player, ego_min_ttc_s and severity; and the cause of a
@@ -61,28 +61,29 @@ class ListedGames:
     pages: int
 
 
-def listed_games(run: Path, chosen: GameList) -> ListedGames:
+def _listed(run: Path, chosen: GameList) -> _Page:
     """The chosen games of a run. Raises UsageError where no game is of an arm, a seed or an outcome."""
     folder = RunFolder(run)
     episodes = episodes_of(folder)
     causes = causes_in_words(read_csv(folder.path / "causes.csv"))
     episodes = _chosen(run, episodes, chosen)
     ordered = worst_first(episodes)
-    games, pages = _page(ordered, chosen)
+    rows = chosen.rows or max(len(ordered), 1)
+    games = ordered.iloc[(chosen.page - 1) * rows : chosen.page * rows]
     players = ("ego", *people_in(episodes.columns))
     columns = ["arm", "seed", "episode", *(f"{name}_outcome" for name in players), "ego_min_ttc_s", "severity"]
     found = [causes.get((game.arm, game.seed, game.episode), "") for game in games.itertuples()]
-    return ListedGames(
+    return _Page(
         games=games[columns].assign(cause=found),
         players=players,
         number=len(ordered),
-        pages=pages,
+        pages=max(-(-len(ordered) // rows), 1),
     )
 
 
 def game_table(run: Path, chosen: GameList) -> Table:
     """The chosen games of a run, for the terminal."""
-    listed = listed_games(run, chosen)
+    listed = _listed(run, chosen)
     left = f"page {chosen.page} of {listed.pages}, {listed.number:,} games; {_OTHERS}; " if listed.pages > 1 else ""
     table = Table(
         title=Text(f"Games of {run}, worst first"),
@@ -105,7 +106,7 @@ def game_table(run: Path, chosen: GameList) -> Table:
 
 def game_records(run: Path, chosen: GameList) -> dict[str, Any]:
     """The chosen games of a run, for JSON: a number that is not known is None."""
-    listed = listed_games(run, chosen)
+    listed = _listed(run, chosen)
     known = listed.games.astype(object).where(listed.games.notna() & ~listed.games.isin([math.inf, -math.inf]), None)
     shown = {"page": chosen.page, "pages": listed.pages, "number": listed.number}
     return {"run": str(run), **shown, "games": known.to_dict("records")}
@@ -123,35 +124,43 @@ def _chosen(run: Path, episodes: pd.DataFrame, chosen: GameList) -> pd.DataFrame
     return episodes
 
 
-def _page(games: pd.DataFrame, chosen: GameList) -> tuple[pd.DataFrame, int]:
-    """The games of the page, and the number of pages."""
-    rows = chosen.rows or max(len(games), 1)
-    first = (chosen.page - 1) * rows
-    return games.iloc[first : first + rows], max(-(-len(games) // rows), 1)
-
-
-@dataclass(frozen=True, kw_only=True)
-class FoundGame:
-    """A recorded game with its replay folder."""
-
-    replay: Path
-    trace: pd.DataFrame
-    title: str
-    names: Mapping[str, str]
-    """What players are called, by their names in the trace."""
-    step_length_s: float
-
-
 @dataclass(frozen=True, kw_only=True)
 class PlayedGame:
-    """A recorded game: its trace, and the scene that it was played on."""
+    """A recorded game: its row of `episodes.csv`, its trace, and the scene that it was played on."""
 
-    name: str
-    title: str
-    record: pd.DataFrame
-    """Its row of `episodes.csv`."""
+    record: Any
     trace: pd.DataFrame
     scene: OpenScene
+
+    @property
+    def name(self) -> str:
+        """The name of its files."""
+        return replay_name(self.record.arm, self.record.seed, self.record.episode)
+
+    @property
+    def title(self) -> str:
+        """The game in words."""
+        return f"{self.record.arm}, seed {self.record.seed}, episode {self.record.episode}"
+
+    @property
+    def names(self) -> Mapping[str, str]:
+        """What players are called, by their names in the trace."""
+        return names_in_pictures(self.record.persona)
+
+    def write_replay(self, folder: Path) -> None:
+        """Write a folder that SUMO-GUI plays."""
+        write_replay(
+            self.trace,
+            self.scene.net_file,
+            self.scene.route_files,
+            folder,
+            title=self.title,
+            step_length_s=self.scene.world.step_s,
+            names=self.names,
+            rails=self.scene.rail_lines,
+            obstacles=self.scene.obstacles,
+            stripes=self.scene.stripes,
+        )
 
 
 def played_game(run: Path, arm: str, episode: int, seed: int | None) -> PlayedGame:
@@ -161,29 +170,25 @@ def played_game(run: Path, arm: str, episode: int, seed: int | None) -> PlayedGa
     """
     folder = RunFolder(run)
     chosen_seed = folder.manifest()["seeds"][0] if seed is None else seed
-    games = games_of_arm(run, episodes_of(folder), arm)
+    games = games_of(run, episodes_of(folder), arm, None)
     found = games[(games["episode"] == episode) & (games["seed"] == chosen_seed)]
     if found.empty:
-        raise UsageError.of(
-            run,
-            f"{arm} {episode}",
-            f"has no such game of seed {chosen_seed}",
-            f"episodes are {games['episode'].min()} to {games['episode'].max()}",
-        )
-    if found.iloc[0]["error"]:
-        raise UsageError.of(run, f"{arm} {episode}", f"could not be played: {found.iloc[0]['error']}", "choose another")
+        message = f"has no such game of seed {chosen_seed}"
+        remedy = f"episodes are {games['episode'].min()} to {games['episode'].max()}"
+        raise UsageError.of(run, f"{arm} {episode}", message, remedy)
+    (record,) = found.itertuples()
+    if record.error:
+        raise UsageError.of(run, f"{arm} {episode}", f"could not be played: {record.error}", "choose another")
     traces = traces_of(folder, arm, chosen_seed, episode)
-    scene = open_scene(folder.scene)
-    trace = read_trace(traces, episode)
+    return read_game(record, traces, TraceReader(), open_scene(folder.scene))
+
+
+def read_game(record: Any, traces: Path, reader: TraceReader, scene: OpenScene) -> PlayedGame:
+    """The game of a row of `episodes.csv`. Raises UsageError if its traces lack it."""
+    trace = reader.read(traces, int(record.episode))
     if trace.empty:
-        raise UsageError.of(traces, "", f"has no trace of episode {episode}", "run the campaign again")
-    return PlayedGame(
-        name=replay_name(arm, chosen_seed, episode),
-        title=f"{arm}, seed {chosen_seed}, episode {episode}",
-        record=found,
-        trace=trace,
-        scene=scene,
-    )
+        raise UsageError.of(traces, "", f"has no trace of episode {record.episode}", "run the campaign again")
+    return PlayedGame(record=record, trace=trace, scene=scene)
 
 
 def traces_of(folder: RunFolder, arm: str, seed: int, episode: int) -> Path:
@@ -200,55 +205,35 @@ def traces_of(folder: RunFolder, arm: str, seed: int, episode: int) -> Path:
 
 
 @contextmanager
-def found_game(run: Path, arm: str, episode: int, seed: int | None) -> Iterator[FoundGame]:
-    """A game with a temporary replay folder, made from its trace. The folders under `replays/` are not opened here: a
-    changed configuration there could make SUMO read and write any file.
-
-    Raises UsageError if there is no such game, or it could not be played.
-    """
-    game = played_game(run, arm, episode, seed)
-    scene, names = game.scene, names_in_pictures(game.record.iloc[0]["persona"])
+def replay_of(game: PlayedGame) -> Iterator[Path]:
+    """A temporary replay folder, made from the trace. The folders under `replays/` are not opened here: a changed
+    configuration there could make SUMO read and write any file."""
     with TemporaryDirectory(prefix="harness-replay-") as scratch:
-        replay = Path(scratch) / game.name
-        write_replay(
-            game.trace,
-            scene.net_file,
-            scene.route_files,
-            replay,
-            title=game.title,
-            step_length_s=scene.world.step_s,
-            names=names,
-            rails=scene.rail_lines,
-            obstacles=scene.obstacles,
-            stripes=scene.stripes,
-        )
-        yield FoundGame(
-            replay=replay, trace=game.trace, title=game.title, names=names, step_length_s=scene.world.step_s
-        )
+        game.write_replay(Path(scratch) / game.name)
+        yield Path(scratch) / game.name
 
 
-def watch(game: FoundGame, console: Console) -> None:
+def watch(game: PlayedGame, console: Console) -> None:
     """Show a game in SUMO-GUI until its user closes it. Raises UsageError if there is no screen or no SUMO-GUI."""
-    message = (
-        f"SUMO-GUI plays {game.replay} at half of real time and follows the ego ({legend(game.trace, game.names)}). It "
-        "halts at a contact and at the end; the play button continues. This command ends when SUMO-GUI is closed."
-    )
-    follow_in_sumo_gui(game.replay, lambda: console.print(message, highlight=False, markup=False, soft_wrap=True))
+    with replay_of(game) as replay:
+        message = (
+            f"SUMO-GUI plays {replay} at half of real time and follows the ego ({legend(game.trace, game.names)}). It "
+            "halts at a contact and at the end; the play button continues. This command ends when SUMO-GUI is closed."
+        )
+        follow_in_sumo_gui(replay, lambda: console.print(message, highlight=False, markup=False, soft_wrap=True))
 
 
-def film(game: FoundGame, file: Path, console: Console) -> None:
+def film(game: PlayedGame, file: Path, console: Console) -> None:
     """Write a game as a film, with a progress bar. Raises UsageError for a missing program."""
-    columns = (TextColumn("filming"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
-        task = bar.add_task("filming", total=None)
+    with replay_of(game) as replay, progress_bar("filming", console) as on_progress:
         pictures = write_film(
-            game.replay,
+            replay,
             game.trace,
             file,
             title=game.title,
-            step_length_s=game.step_length_s,
+            step_length_s=game.scene.world.step_s,
             names=game.names,
-            on_progress=lambda done, total: bar.update(task, completed=done, total=total),
+            on_progress=on_progress,
         )
     console.print(f"Wrote {file}: {pictures} pictures.", highlight=False, markup=False, soft_wrap=True)
 
@@ -262,18 +247,13 @@ def episodes_of(folder: RunFolder) -> pd.DataFrame:
 def games_of(run: Path, episodes: pd.DataFrame, arm: str | None, seed: int | None) -> pd.DataFrame:
     """The rows of an arm and of a training seed; None is every one. Raises UsageError if there are none."""
     if arm is not None:
-        episodes = games_of_arm(run, episodes, arm)
+        arms = sorted(set(episodes["arm"]))
+        if arm not in arms:
+            raise UsageError.of(run, arm, "has no such arm", nearest(arm, arms or ["(no arm is done yet)"]))
+        episodes = episodes[episodes["arm"] == arm]
     if seed is not None:
         seeds = sorted(set(episodes["seed"]))
         if seed not in seeds:
             raise UsageError.of(run, f"seed {seed}", "has no games", f"seeds are {', '.join(map(str, seeds))}")
         episodes = episodes[episodes["seed"] == seed]
     return episodes
-
-
-def games_of_arm(run: Path, episodes: pd.DataFrame, arm: str) -> pd.DataFrame:
-    """The rows of an arm. Raises UsageError if there is none."""
-    arms = sorted(set(episodes["arm"]))
-    if arm not in arms:
-        raise UsageError.of(run, arm, "has no such arm", nearest(arm, arms or ["(no arm is done yet)"]))
-    return episodes[episodes["arm"] == arm]

@@ -1,24 +1,46 @@
-"""The results of a run: tables, replays and report, from its folder alone."""
+"""The results of a run: tables, model cards, replays, report and files for CI, from its folder alone."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from rich.console import Console
 
-from harness.campaign.results.evaluate_run import evaluated
+from harness.campaign.plan.stages import stage_id
+from harness.campaign.results.ci_files import write_ci_files
+from harness.campaign.results.evaluate_run import csv_tables, evaluated
 from harness.campaign.results.kept_results import RunResult, keep_result
+from harness.campaign.results.model_cards import write_model_cards
 from harness.campaign.results.read_run import read_run
-from harness.campaign.results.write_run import write_run
+from harness.campaign.results.recorded_games import recorded_games, scene_drawing
+from harness.campaign.results.shown_result import shown_result
+from harness.campaign.results.shown_work import doing
+from harness.campaign.results.write_replays import write_replays
 from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.run_log import LOGGER
+from harness.evaluation.tables import write_csv
+from harness.files import write_atomically
+from harness.reports.page import render_page
 from harness.reports.provenance import mixed_versions, warn
 
 
 def write_results(folder: RunFolder, console: Console) -> RunResult:
-    """Write tables, replays and report of the finished stages."""
+    """Write the results of the finished stages. Returns what the terminal shows."""
     run = read_run(folder, console)
     tables = evaluated(run)
-    result = write_run(folder, run, tables, console)
-    warn(mixed_versions(tables.manifest["stages"]), console)
+    for name, table in csv_tables(run, tables).items():
+        write_csv(table, folder.path / f"{name}.csv")
+    write_model_cards(folder, tables.manifest, run.policies, tables.summary)
+    tables = replace(tables, replays=write_replays(folder, run.scene, tables.episodes, console))
+    with doing(console, "writing the report"):
+        games = recorded_games(
+            tables.episodes, tables.arms, lambda arm, seed: folder.traces(stage_id(arm, seed)), run.scene
+        )
+        page = render_page(tables, games, scene_drawing(run.scene))
+    write_atomically(folder.path / "report.html", page.encode())
+    result = shown_result(run.campaign, tables)
+    write_ci_files(folder, tables.manifest, tables.acceptance, result)
+    warn(mixed_versions(tables.stages), console)
     keep_result(folder, run.manifest, result)
     LOGGER.info("wrote the results of %d games; exit code %d", len(tables.episodes), result.exit_code)
     return result

@@ -2,38 +2,36 @@
 
 from __future__ import annotations
 
-from harness.campaign.results.ci_files import shown_lines
 from harness.campaign.results.kept_results import RunResult, ShownCheck, ShownVerdict
 from harness.campaign.storage.learned import did_not_learn
 from harness.campaign.storage.manifest import FINISHED
 from harness.config.campaign import Campaign
 from harness.errors import plain
 from harness.evaluation.unplayed_games import reasons_of
+from harness.reports.acceptance_wording import acceptance_lines
 from harness.reports.game_wording import gap_verdicts
 from harness.reports.run_tables import QUESTIONS, RunTables
 from harness.reports.verdict_wording import Answer, answer
 
 
-def shown_result(campaign: Campaign, report: RunTables) -> RunResult:
+def shown_result(campaign: Campaign, tables: RunTables) -> RunResult:
     """Verdicts, acceptance checks, and what went wrong."""
-    entries = report.manifest["stages"]
-    personas = [*report.manifest["personas"], *campaign.mixed_people]
     verdicts = [
-        _shown(persona, answer(report, question, persona), report.causes_of(question, persona))
-        for persona in personas
+        _shown(persona, answer(tables, question, persona), tables.causes_of(question, persona))
+        for persona in [*tables.manifest["personas"], *campaign.mixed_people]
         for question in QUESTIONS
     ]
-    if report.game is not None:
-        verdicts += [_shown(persona, verdict) for persona, verdict in gap_verdicts(report.game.gaps)]
+    if tables.game is not None:
+        verdicts += [_shown(persona, verdict) for persona, verdict in gap_verdicts(tables.game.gaps)]
     return RunResult(
         verdicts=tuple(verdicts),
-        failed_stages=tuple(name for name, entry in entries.items() if entry["status"] not in FINISHED),
-        error_games=int((report.episodes["error"] != "").sum()),
-        error_reasons=tuple(map(plain, reasons_of(report.episodes["error"]))),
-        did_not_learn=tuple(f"{name}: {shortfall}" for name, shortfall in did_not_learn(entries).items()),
+        failed_stages=tuple(name for name, entry in tables.stages.items() if entry["status"] not in FINISHED),
+        error_games=int((tables.episodes["error"] != "").sum()),
+        error_reasons=tuple(map(plain, reasons_of(tables.episodes["error"]))),
+        did_not_learn=tuple(f"{name}: {shortfall}" for name, shortfall in did_not_learn(tables.stages).items()),
         acceptance=tuple(
             ShownCheck(passed=each.passed, text=each.text)
-            for each in shown_lines(report.acceptance, len(campaign.seeds))
+            for each in acceptance_lines(tables.acceptance or (), len(campaign.seeds))
         ),
     )
 

@@ -17,14 +17,8 @@ from harness.reports.persona.profile import (
     NO_CHECK_MARK,
     WANTS,
     PersonaProfile,
-    attends,
-    body,
-    decides,
     function_in_words,
-    lapses_of,
     number,
-    sees,
-    wants,
 )
 from harness.reports.persona.worth import PayoffFunction
 
@@ -45,21 +39,18 @@ def render_profile(profile: PersonaProfile) -> str:
         functions.append((each, words, function_figure(each, f"function{k}", f"{each.name}: {words}")))
     lapses = None
     if profile.persona.human_factors.attention is not None:
-        lapses = drives_figure(profile.drives, "drives", lapses_of(profile))
+        alternative = f"Lapses of attention in {len(profile.drives)} drives of {DRIVE_S:g} s"
+        lapses = drives_figure(profile.drives, "drives", alternative)
     page = (
         environment_of("reports/persona", "reports")
         .get_template("profile.html.jinja")
         .render(
+            profile=profile,
             persona=profile.persona,
             headings={"wants": WANTS, "attends": ATTENDS, "decides": DECIDES},
             formula=FORMULA,
-            terms=profile.terms,
-            wants=list(wants(profile)),
             functions=functions,
-            attends=[*attends(profile), *sees(profile), *body(profile)],
             drives_figure=lapses,
-            decides=decides(profile),
-            number=number,
         )
     )
     return page.strip() + "\n"

@@ -18,13 +18,8 @@ from harness.reports.persona.profile import (
     NO_CHECK_MARK,
     WANTS,
     PersonaProfile,
-    attends,
-    body,
-    decides,
     function_in_words,
     number,
-    sees,
-    wants,
 )
 from harness.reports.persona.worth import PayoffFunction
 
@@ -57,8 +52,9 @@ def show(profile: PersonaProfile, console: Console) -> None:
         write(f"{source.statistic} [{source.citation}]", "dim", indent=2)
     write(f"\n{WANTS}", "bold")
     write(FORMULA)
-    write_table(("term", "α × weight", "counted for", "payoff"), _terms(profile))
-    for sentence in wants(profile):
+    rows = ((name, weight, counted, worth) for name, _, weight, counted, worth in profile.payoffs)
+    write_table(("term", "α × weight", "counted for", "payoff"), rows)
+    for sentence in profile.wants:
         write(sentence)
     for function in profile.functions:
         write(f"\n{function.name}: a function of {function.quantity}", "bold")
@@ -67,22 +63,12 @@ def show(profile: PersonaProfile, console: Console) -> None:
         write_table((function.quantity, *sets, "payoff per second"), _examples(function))
         write(function_in_words(function))
     write(f"\n{ATTENDS}", "bold")
-    for sentence in (*attends(profile), *sees(profile), *body(profile)):
+    for sentence in profile.attends:
         write(sentence)
     if persona.human_factors.attention is not None:
         write_table((f"drive of {DRIVE_S:g} s", "lapses of attention (s)"), _drives(profile))
     write(f"\n{DECIDES}", "bold")
-    write(decides(profile))
-
-
-def _terms(profile: PersonaProfile) -> Iterable[Sequence[str]]:
-    for each in profile.terms:
-        counted = f"{each.meaning}, {each.limit}" if each.limit else each.meaning
-        yield each.name, f"{each.alpha:g} × {each.weight:g}", counted, f"{number(each.worth)} {each.moment}"
-    for function in profile.functions:
-        payoff = f"{number(function.worst[0])} to {number(function.best[0])} per second"
-        counted = f"a function of {function.quantity}, below"
-        yield function.name, f"{function.alpha:g} × {function.weight:g}", counted, payoff
+    write(profile.decides)
 
 
 def _examples(function: PayoffFunction) -> Iterable[Sequence[str]]:

@@ -43,18 +43,43 @@ MOST_LIKELY = "The action is always the policy's most likely one."
 
 @dataclass(frozen=True, kw_only=True)
 class PersonaProfile:
-    """A persona, and what is computed from its document."""
+    """A persona, and what is computed from its document; sentences for the page and the terminal."""
 
     persona: Persona
     terms: Sequence[TermExample]
     functions: Sequence[PayoffFunction]
     drives: Sequence[SampleDrive]
+    wants: Sequence[str]
+    """The payoff's terms compared with each other."""
+    attends: Sequence[str]
+    """Attention, sight, perception, reaction, and how much of the car the person uses."""
+    decides: str
+    """How actions follow from the person's policy."""
+
+    @property
+    def payoffs(self) -> Iterator[tuple[str, str, str, str, str]]:
+        """The rows of the payoff's table: term, group, alpha and weight, for what it counts, and how much."""
+        for each in self.terms:
+            counted = f"{each.meaning}, {each.limit}" if each.limit else each.meaning
+            weight, worth = f"{each.alpha:g} × {each.weight:g}", f"{number(each.worth)} {each.moment}"
+            yield each.name, each.group, weight, counted, worth
+        for function in self.functions:
+            weight = f"{function.alpha:g} × {function.weight:g}"
+            worth = f"{number(function.worst[0])} to {number(function.best[0])} per second"
+            yield function.name, "human", weight, f"a function of {function.quantity}, below", worth
 
 
 def persona_profile(persona: Persona) -> PersonaProfile:
     """The profile of a persona; equal documents give equal profiles."""
+    terms, functions, drives = term_examples(persona), payoff_functions(persona), sample(persona)
     return PersonaProfile(
-        persona=persona, terms=term_examples(persona), functions=payoff_functions(persona), drives=sample(persona)
+        persona=persona,
+        terms=terms,
+        functions=functions,
+        drives=drives,
+        wants=list(_wants(persona, terms)),
+        attends=[*_attention(persona, drives), *_blind_spot(persona, drives), *_body(persona)],
+        decides=SAMPLED if persona.decisions == "sampled" else MOST_LIKELY,
     )
 
 
@@ -71,9 +96,8 @@ def percent(share: float) -> str:
     return "under 1 %" if 0.0 < share < 0.01 else f"{share * 100:.0f} %"
 
 
-def wants(profile: PersonaProfile) -> Iterator[str]:
-    """The payoff's terms compared with each other."""
-    worth = {each.name: each.worth for each in profile.terms}
+def _wants(persona: Persona, terms: Sequence[TermExample]) -> Iterator[str]:
+    worth = {each.name: each.worth for each in terms}
     collision, progress, goal = (worth.get(name, 0.0) for name in ("collision", "progress", "goal"))
     if collision == 0.0:
         yield COLLISION_IS_FREE
@@ -82,8 +106,8 @@ def wants(profile: PersonaProfile) -> Iterator[str]:
     elif goal:
         yield f"A collision costs {-collision / goal:.3g} times the payoff of the goal."
     for group in GROUPS:
-        has_terms = any(each.group == group for each in profile.terms) or (group == "human" and profile.functions)
-        if has_terms and profile.persona.payoff.alpha[group] == 0.0:
+        has_terms = any(each.group == group for each in terms) or (group == "human" and persona.payoff.fuzzy)
+        if has_terms and persona.payoff.alpha[group] == 0.0:
             yield f"The {group} terms have no effect: their alpha is 0."
 
 
@@ -108,14 +132,9 @@ def _stretch(ends: Sequence[float], unit: str) -> str:
     return f"at {low:.3g}{unit}" if low == high else f"from {low:.3g} to {high:.3g}{unit}"
 
 
-def lapses_of(profile: PersonaProfile) -> str:
-    """The text of the figure of sample drives."""
-    return f"Lapses of attention in {len(profile.drives)} drives of {DRIVE_S:g} s"
-
-
-def attends(profile: PersonaProfile) -> Iterator[str]:
+def _attention(persona: Persona, drives: Sequence[SampleDrive]) -> Iterator[str]:
     """The lapses of attention, and the motion of the car in a lapse."""
-    attention = profile.persona.human_factors.attention
+    attention = persona.human_factors.attention
     if attention is None:
         yield NO_LAPSES
         return
@@ -127,9 +146,9 @@ def attends(profile: PersonaProfile) -> Iterator[str]:
         f"with {attention.mean_attentive_s:g} s of attention between them on average; "
         f"{lapses_per_minute(attention):.2g} lapses per minute."
     )
-    drawn_share = sum(each.lapsed_share for each in profile.drives) / len(profile.drives)
+    drawn_share = sum(each.lapsed_share for each in drives) / len(drives)
     yield (
-        f"In the {len(profile.drives)} sample drives: {percent(drawn_share)}. Of drives of {DRIVE_S:g} s, "
+        f"In the {len(drives)} sample drives: {percent(drawn_share)}. Of drives of {DRIVE_S:g} s, "
         f"{percent(free_share(attention))} have no lapse."
     )
     yield "In a lapse the person releases pedals and wheel. " + _drifts(
@@ -149,25 +168,25 @@ def _drifts(crown_rad: float, bumps_rad: float, lapse_s: float) -> str:
     )
 
 
-def sees(profile: PersonaProfile) -> Iterator[str]:
+def _blind_spot(persona: Persona, drives: Sequence[SampleDrive]) -> Iterator[str]:
     """The vehicles that the person does not see without a blind-spot check, and how often."""
-    sight = profile.persona.human_factors.sight
+    sight = persona.human_factors.sight
     if sight.no_blind_spot_check_share == 0.0:
         yield ALWAYS_CHECKS
         return
     ahead_m = sight.unseen_behind_m
     where = f"is not at least {ahead_m:g} m ahead of" if ahead_m >= 0.0 else f"is more than {-ahead_m:g} m behind"
-    count = sum(each.no_blind_spot_check for each in profile.drives)
+    count = sum(each.no_blind_spot_check for each in drives)
     yield (
         f"No blind-spot check in {percent(sight.no_blind_spot_check_share)} of the drives "
-        f"({count} of the {len(profile.drives)} sample drives): "
+        f"({count} of the {len(drives)} sample drives): "
         f"a vehicle is not seen when its centre {where} the person's own."
     )
 
 
-def body(profile: PersonaProfile) -> Iterator[str]:
+def _body(persona: Persona) -> Iterator[str]:
     """How far and how exactly the person sees, its reaction time, and how much of the car it uses."""
-    human_factors = profile.persona.human_factors
+    human_factors = persona.human_factors
     sight = human_factors.sight
     if sight.looked_but_failed_to_see_share:
         yield (
@@ -184,29 +203,16 @@ def body(profile: PersonaProfile) -> Iterator[str]:
         yield f"At {NEAR_M:g} m, the error of closing speeds is {error_mps:.2g} m/s (standard deviation)."
     if sight.distance_error or sight.closing_error_per_s:
         yield f"An error of perception lasts for about {PERSISTENCE_S:g} s."
-    yield from _reaction(human_factors.reaction.delay_s, human_factors.attention is not None)
+    shortest, longest = human_factors.reaction.delay_s
+    if longest > 0.0:
+        length = f"{shortest:g}" if shortest == longest else f"{shortest:g} to {longest:g}"
+        speed, distance_m = f"{DRIFT_SPEED_MPS * 3.6:.0f} km/h", DRIFT_SPEED_MPS * longest
+        yield f"A decision takes effect {length} s later: at {speed} after up to {distance_m:.2g} m."
+        if human_factors.attention is not None:
+            yield AFTER_A_LAPSE
     uses = human_factors.actuator_shares
     shares = {"acceleration": uses.throttle_share, "braking": uses.braking_share, "steering": uses.steering_share}
     if used := [f"{percent(share)} of the {name}" for name, share in shares.items() if share < 1.0]:
         yield f"The person uses {', '.join(used)} of the car."
     if human_factors.with_open_eyes != human_factors:
         yield UNIMPAIRED_IN_TRAINING
-
-
-def _reaction(delay_s: tuple[float, float], lapses: bool) -> Iterator[str]:
-    shortest, longest = delay_s
-    if longest == 0.0:
-        return
-    length = f"{shortest:g}" if shortest == longest else f"{shortest:g} to {longest:g}"
-    distance_m = DRIFT_SPEED_MPS * longest
-    speed = f"{DRIFT_SPEED_MPS * 3.6:.0f} km/h"
-    yield f"A decision takes effect {length} s later: at {speed} after up to {distance_m:.2g} m."
-    if lapses:
-        yield AFTER_A_LAPSE
-
-
-def decides(profile: PersonaProfile) -> str:
-    """How actions follow from the person's policy."""
-    if profile.persona.decisions == "sampled":
-        return SAMPLED
-    return MOST_LIKELY

@@ -11,7 +11,7 @@ from PIL import Image
 from rich.console import Console
 
 import tests.support.tiny as tiny
-from harness.campaign.results.replay_game import GameList, film, found_game, game_table, watch
+from harness.campaign.results.replay_game import GameList, film, game_table, played_game, replay_of, watch
 from harness.campaign.results.results import write_results
 from harness.campaign.storage.run_folder import RunFolder
 from harness.errors import UsageError
@@ -63,41 +63,41 @@ def test_report__makes_tables_of_the_log_anew_without_playing_a_game(run: Path) 
 
 def test_game__is_made_from_its_trace_and_not_from_the_folder_replays(run: Path) -> None:
     name = replay_name("naive_alone", 1, 3)
-    with found_game(run, "naive_alone", 3, None) as game:
-        before = {file.name: file.read_bytes() for file in game.replay.iterdir()}
+    with replay_of(played_game(run, "naive_alone", 3, None)) as replay:
+        before = {file.name: file.read_bytes() for file in replay.iterdir()}
     (run / "replays" / name).mkdir(exist_ok=True)
     # a configuration can make SUMO write anywhere, and the folder may come from another machine
     (run / "replays" / name / "scene.sumocfg").write_text("<configuration><log value='/tmp/mine'/></configuration>")
-    with found_game(run, "naive_alone", 3, 1) as game:
-        assert {file.name: file.read_bytes() for file in game.replay.iterdir()} == before
+    with replay_of(played_game(run, "naive_alone", 3, 1)) as replay:
+        assert {file.name: file.read_bytes() for file in replay.iterdir()} == before
 
 
 def test_game__needs_no_replay_folder(run: Path) -> None:
     name = replay_name("naive_alone", 1, 3)
     shutil.rmtree(run / "replays")
-    with found_game(run, "naive_alone", 3, None) as game:
-        assert game.replay.name == name
-        assert (game.replay / "scene.sumocfg").is_file()
-        assert game.title == "naive_alone, seed 1, episode 3"
+    game = played_game(run, "naive_alone", 3, None)
+    assert game.title == "naive_alone, seed 1, episode 3"
+    with replay_of(game) as replay:
+        assert replay.name == name
+        assert (replay / "scene.sumocfg").is_file()
         assert not (run / "replays").exists()
-        scratch = game.replay.parent
-    assert not scratch.exists()
+    assert not replay.parent.exists()
 
 
 def test_watch__without_a_screen_names_the_film(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.setattr("harness.replay.sumo_gui.sys.platform", "linux")
-    with found_game(run, "naive_alone", 0, None) as game, pytest.raises(UsageError, match="--film"):
-        watch(game, Console(file=io.StringIO()))
+    with pytest.raises(UsageError, match="--film"):
+        watch(played_game(run, "naive_alone", 0, None), Console(file=io.StringIO()))
 
 
 def test_film__of_a_game_without_a_replay_folder(run: Path, tmp_path: Path) -> None:
     require_gui()
     shutil.rmtree(run / "replays")
     console = Console(file=io.StringIO(), width=200)
-    with found_game(run, "naive_vs_speedy", 0, None) as game:
-        film(game, tmp_path / "film.gif", console)
-        pictures = int(game.trace["step"].max()) + 1
+    game = played_game(run, "naive_vs_speedy", 0, None)
+    film(game, tmp_path / "film.gif", console)
+    pictures = int(game.trace["step"].max()) + 1
     assert isinstance(console.file, io.StringIO)
     assert console.file.getvalue().strip() == f"Wrote {tmp_path / 'film.gif'}: {pictures} pictures."
     with Image.open(tmp_path / "film.gif") as made:
