@@ -17,9 +17,9 @@ from harness.reports.game import CAPTIONS, game_section
 from harness.reports.game_links import GameLinks
 from harness.reports.game_wording import MEANINGS, NEAR, NO, OPEN, equilibrium_sentences, gap_verdicts
 from harness.reports.heatmaps import OPENS_A_GAME, views
-from tests.support.chromium import launched, opener
+from tests.support.chromium import COLOURS, contrast, rgb, unfold
 from tests.support.game_tables import arm, findings, table
-from tests.support.pages import CONTRAST, Page, campaign, rendered
+from tests.support.pages import Page, campaign, rendered
 
 NO_LINKS = GameLinks(embedded=(), episodes=table_of("episodes"))
 
@@ -126,25 +126,18 @@ def test_section__is_there_only_where_a_run_has_such_tables(html):
 
 # --- words ---
 
-EGO = Response(
-    seed=1,
-    role="ego",
-    persona="speedy",
-    round=3,
-    pair_arm="pair",
-    response_arm="best_ego",
-    ego="retrained_speedy",
-    non_ego="speedy",
-)
-NON_EGO = Response(
-    seed=1,
-    role="non_ego",
-    persona="speedy",
-    round=3,
-    pair_arm="pair",
-    response_arm="best_non_ego",
-    ego="retrained_speedy",
-    non_ego="speedy",
+EGO, NON_EGO = (
+    Response(
+        seed=1,
+        role=role,
+        persona="speedy",
+        round=3,
+        pair_arm="pair",
+        response_arm=f"best_{role}",
+        ego="retrained_speedy",
+        non_ego="speedy",
+    )
+    for role in ("ego", "non_ego")
 )
 
 
@@ -259,66 +252,35 @@ def test_words__of_an_equilibrium_name_shares_failures_and_payoff():
 
 
 @pytest.fixture(scope="module")
-def browser():
-    with launched() as browser:
-        yield browser
-
-
-@pytest.fixture
-def opened(browser, html, tmp_path):
-    (tmp_path / "report.html").write_text(html, encoding="utf-8")
-    with opener(browser, tmp_path / "report.html") as open_page:
-        yield open_page
-
-
-@pytest.mark.parametrize("width", [320, 400, 1280])
-def test_browser__the_page_does_not_scroll_sideways_and_nothing_lies_on_another(opened, width):
-    page = opened(width=width)
-    page.evaluate("for (const each of document.querySelectorAll('details')) each.open = true;")
-    assert page.seen == []
-    assert page.evaluate("document.documentElement.scrollWidth") <= width
-    overlaps = page.evaluate(
-        """() => {
-          const boxes = [...document.querySelectorAll("#game > details > *, #game .maps figure")]
-            .filter(each => each.checkVisibility() && !each.classList.contains("views"))
-            .map(each => each.getBoundingClientRect());
-          return boxes.flatMap((a, n) => boxes.slice(n + 1).filter(b =>
-            a.left < b.right - 1 && b.left < a.right - 1 && a.top < b.bottom - 1 && b.top < a.bottom - 1)).length;
-        }"""
-    )
-    assert overlaps == 0
+def report(html, tmp_path_factory):
+    path = tmp_path_factory.mktemp("report") / "report.html"
+    path.write_text(html, encoding="utf-8")
+    return path
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_browser__numbers_stand_out_from_the_darkest_cell(opened, scheme):
     page = opened(color_scheme=scheme)
     for selector in ("#game .sentence", "#game .induced", "#game figcaption", "#game .heat svg text", "#game dd"):
-        assert page.locator(selector).first.evaluate(CONTRAST) >= 4.5, selector
-    worst = page.evaluate(
-        """() => {
-          const numbers = colour => colour.match(/[\\d.]+/g).map(Number);
-          const luminance = colour => {
-            const [r, g, b] = colour.map(part => part / 255)
-              .map(part => part <= 0.03928 ? part / 12.92 : ((part + 0.055) / 1.055) ** 2.4);
-            return 0.2126 * r + 0.7152 * g + 0.0722 * b;
-          };
-          const ground = numbers(getComputedStyle(document.querySelector("#game .heat")).backgroundColor);
-          const ink = luminance(numbers(getComputedStyle(document.querySelector("#game .heat svg text")).fill));
-          return Math.min(...[...document.querySelectorAll("#game .heat svg path")].map(cell => {
-            const style = getComputedStyle(cell), opacity = Number(style.opacity) * Number(style.fillOpacity);
-            if (style.fill === "none" || opacity === 1) return Infinity;
-            const mixed = numbers(style.fill).slice(0, 3).map((part, n) => part * opacity + ground[n] * (1 - opacity));
-            const [a, b] = [ink, luminance(mixed)];
-            return (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
-          }));
-        }"""
+        assert contrast(*page.locator(selector).first.evaluate(COLOURS)) >= 4.5, selector
+    ink, ground = page.locator("#game .heat svg text").first.evaluate(COLOURS)
+    cells = page.locator("#game .heat svg path").evaluate_all(
+        """cells => cells.map(cell => getComputedStyle(cell)).filter(style => style.fill !== "none")
+          .map(style => [style.fill, Number(style.opacity) * Number(style.fillOpacity)])"""
+    )
+    worst = min(
+        contrast(
+            ink, [part * opacity + behind * (1 - opacity) for part, behind in zip(rgb(fill), rgb(ground), strict=True)]
+        )
+        for fill, opacity in cells
+        if opacity < 1
     )
     assert 4.5 <= worst < 21
 
 
 def test_browser__a_seed_is_chosen_by_keyboard_or_mouse(opened):
     page = opened()
-    page.evaluate("for (const each of document.querySelectorAll('details')) each.open = true;")
+    unfold(page)
     shown = page.locator("#game .maps:visible .figure-title").first
     assert shown.inner_text() == "Failure rate of the ego (%), mean over 2 seeds"
     page.get_by_label("seed 2", exact=True).check()

@@ -1,33 +1,24 @@
 from __future__ import annotations
 
-import csv
 import math
 import re
+from functools import partial
 
 import pandas as pd
 import pytest
 
 from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.research_questions import INCOMPETENT, Verdict
-from harness.evaluation.tables import write_csv
 from harness.evaluation.worst_first import worst_first
 from harness.replay.selection import choose_games, replay_name
 from harness.reports import page as page_module
-from harness.reports.differences import CHANCE, NO_T_STATISTIC, effect, speed_sentence
+from harness.reports.differences import CHANCE, NO_T_STATISTIC, effect, p_values, speed_sentence
 from harness.reports.numbers import duration, number, p_number, p_text, percent, signed
 from harness.reports.page import REPLAYS_SHOWN
 from harness.reports.run_tables import RunTables
 from harness.reports.verdict_wording import NO_ROUND_2, answer
 from tests.support.incompetent import cannot_drive
-from tests.support.pages import (
-    Page,
-    blank_figures,
-    campaign,
-    recomputed,
-    recordings,
-    rendered,
-    with_errors,
-)
+from tests.support.pages import Page, blank_figures, campaign, recomputed, recordings, rendered, with_errors
 
 
 @pytest.fixture(scope="module")
@@ -43,24 +34,6 @@ def html(small):
 @pytest.fixture(scope="module")
 def page(html):
     return Page(html)
-
-
-# --- numbers ---
-
-
-@pytest.mark.parametrize("name", ["comparisons", "summary"])
-def test_page__the_numbers_are_those_of_the_csv_file(name, small, page, tmp_path):
-    write_csv(small[name], tmp_path / "table.csv")
-    with (tmp_path / "table.csv").open(newline="", encoding="utf-8") as file:
-        assert page.cells(name) == list(csv.reader(file))
-
-
-def test_page__every_link_leads_to_a_part_of_the_page(page):
-    """A published page stands alone: what lies beside it in the run folder is not there."""
-    links = {attributes["href"] for tag, attributes in page.tags if tag == "a"}
-    ids = {attributes["id"] for _, attributes in page.tags if "id" in attributes}
-    assert links
-    assert {link for link in links if not link.startswith("#game=") and link.removeprefix("#") not in ids} == set()
 
 
 def test_page__a_table_too_long_for_a_page_is_left_to_its_file(small, monkeypatch):
@@ -99,79 +72,75 @@ def verdict_texts(arguments):
     return [(label, sentence.replace("\N{NO-BREAK SPACE}", " ")) for label, sentence in plain]
 
 
-def test_words__not_significant_is_never_a_no():
-    rq1, rq2 = verdict_texts(campaign(personas=["speedy"], failing={"naive": 0.05, "retrained": 0.2}))
-    assert rq1[0] == "RQ1: not shown"
-    assert f"fails in 3 of 60 games against the speedy driver and in 0 of 60 alone: {CHANCE}" in rq1[1]
-    assert rq2[0] == "RQ2: not shown"
-    assert f"the retrained ego fails in 12 of 60 games, the naive ego in 3 of 60: {CHANCE}" in rq2[1]
-
-
-def test_words__significant_before_holm_only_is_not_a_yes():
+def before_holm_only():
     arguments = campaign(personas=["speedy"], failing={"naive": 0.1})
     failure = arguments["comparisons"].index[0]
-    arguments["comparisons"].loc[failure, "p_holm"] = 0.025
-    arguments["comparisons"].loc[failure, "verdict"] = Verdict.BEFORE_HOLM_ONLY.value
-    rq1, _ = verdict_texts(arguments)
-    assert rq1[0] == "RQ1: only before Holm's correction"
-    assert "significantly more often without correction, but not after Holm's correction" in rq1[1]
-    assert "p = 0.025 after Holm's correction" in text_of(arguments).replace("\N{NO-BREAK SPACE}", " ")
-
-
-def test_words__all_differences_equal_names_mcnemars_p_and_never_says_significant():
-    rq1, _ = verdict_texts(campaign(personas=["speedy"], failing={"naive": 1}))
-    assert rq1[0] == "RQ1: no t statistic"
-    assert NO_T_STATISTIC.format(pairs=60) in rq1[1]
-    assert "McNemar's exact test gives p < 0.0001. This is below the campaign's significance" in rq1[1]
-    assert "significantly" not in rq1[1]
-
-
-def test_words__an_arm_that_was_not_played_is_named():
-    arguments = campaign(personas=["speedy"])
-    rq1, rq2 = verdict_texts(with_errors(arguments, arguments["episodes"]["arm"] == "retrained_vs_speedy"))
-    assert rq1[0] == "RQ1: yes"
-    assert rq2 == ("RQ2: not answered", NOT_PLAYED)
-
-
-def test_words__a_stage_that_is_not_done_leaves_its_question_not_answered():
-    arguments = without_arm(campaign(personas=["speedy"]), "retrained_vs_speedy", seeds=[1])
-    assert verdict_texts(arguments)[1] == ("RQ2: not answered", NOT_PLAYED)
-    arguments = without_arm(campaign(personas=["speedy"], seeds=(1, 2)), "retrained_vs_speedy", seeds=[2])
-    assert verdict_texts(arguments)[1][0] == "RQ2: yes in 1 of 2 seeds"
-    assert f"Seed 2: not answered. {NOT_PLAYED}" in text_of(arguments)
-
-
-def without_arm(arguments, arm, seeds):
-    """The campaign with a failed arm: it has neither games nor comparisons."""
-    rows, compared = arguments["episodes"], arguments["comparisons"]
-    lost = (compared["question"] == "RQ2") & compared["seed"].isin(seeds)
-    arguments["episodes"] = rows[~((rows["arm"] == arm) & rows["seed"].isin(seeds))]
-    arguments["comparisons"] = compared[~lost]
-    arguments["summary"] = summarise(arguments["episodes"])
-    for seed in seeds:
-        arguments["manifest"]["stages"][f"{arm}-seed{seed}"] |= {"status": "failed", "message": "it died"}
+    arguments["comparisons"].loc[failure, ["p_holm", "verdict"]] = [0.025, Verdict.BEFORE_HOLM_ONLY.value]
     return arguments
 
 
-def test_words__without_retraining_round_2_was_not_played():
-    arguments = campaign(personas=["speedy"], retrained=False)
-    rq1, rq2 = verdict_texts(arguments)
-    assert rq1[0] == "RQ1: yes"
-    assert rq2[1] == NO_ROUND_2
-    assert "retrained vs" not in without_curves(arguments)
+def not_played():
+    arguments = campaign(personas=["speedy"])
+    return with_errors(arguments, arguments["episodes"]["arm"] == "retrained_vs_speedy")
 
 
-def test_words__several_seeds_are_counted_and_shown_each():
+def without_arm(seeds, failed):
+    """A campaign with a failed arm of round 2: it has neither games nor comparisons."""
+    arguments = campaign(personas=["speedy"], seeds=seeds)
+    rows, compared, arm = arguments["episodes"], arguments["comparisons"], "retrained_vs_speedy"
+    arguments["episodes"] = rows[~((rows["arm"] == arm) & (rows["seed"] == failed))]
+    arguments["comparisons"] = compared[~((compared["question"] == "RQ2") & (compared["seed"] == failed))]
+    arguments["summary"] = summarise(arguments["episodes"])
+    arguments["manifest"]["stages"][f"{arm}-seed{failed}"] |= {"status": "failed", "message": "it died"}
+    return arguments
+
+
+def tame_in_one_seed():
     arguments = campaign(personas=["speedy"], seeds=(1, 2, 3))
     episodes = arguments["episodes"]
     tame = (episodes["arm"] == "naive_vs_speedy") & (episodes["seed"] == 2)
-    episodes.loc[tame, ["ego_failed"]] = 0
-    episodes.loc[tame, ["ego_outcome"]] = "goal"
-    rq1, rq2 = verdict_texts(recomputed(arguments))
-    assert rq1[0] == "RQ1: yes in 2 of 3 seeds"
-    assert rq1[1].startswith("In 2 of 3 training seeds the speedy driver makes the naive ego fail significantly more")
-    assert rq2[0] == "RQ2: yes in 2 of 3 seeds"
-    text = text_of(arguments)
+    episodes.loc[tame, ["ego_failed", "ego_outcome"]] = [0, "goal"]
+    return recomputed(arguments)
+
+
+def failing(**shares):
+    return partial(campaign, personas=["speedy"], failing=shares)
+
+
+MCNEMAR = "McNemar's exact test gives p < 0.0001. This is below the campaign's significance"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "label", "sentence"),
+    [
+        (
+            failing(naive=0.05),
+            "RQ1: not shown",
+            f"3 of 60 games against the speedy driver and in 0 of 60 alone: {CHANCE}",
+        ),
+        (failing(naive=0.05, retrained=0.2), "RQ2: not shown", f"12 of 60 games, the naive ego in 3 of 60: {CHANCE}"),
+        (before_holm_only, "RQ1: only before Holm's correction", "correction, but not after Holm's correction"),
+        (failing(naive=1), "RQ1: no t statistic", f"{NO_T_STATISTIC.format(pairs=60)}. {MCNEMAR}"),
+        (not_played, "RQ1: yes", "makes the naive ego fail in 18 of 60 games instead of 0 of 60"),
+        (not_played, "RQ2: not answered", NOT_PLAYED),
+        (partial(without_arm, [1], 1), "RQ2: not answered", NOT_PLAYED),
+        (partial(without_arm, [1, 2], 2), "RQ2: yes in 1 of 2 seeds", "In 1 of 2 it is not answered."),
+        (partial(campaign, personas=["speedy"], retrained=False), "RQ2: not asked", NO_ROUND_2),
+        (
+            tame_in_one_seed,
+            "RQ1: yes in 2 of 3 seeds",
+            "In 2 of 3 training seeds the speedy driver makes the naive ego",
+        ),
+    ],
+)
+def test_words__say_no_more_than_the_verdict(arguments, label, sentence):
+    answers = dict(verdict_texts(arguments()))
+    assert label in answers
+    assert sentence in answers[label]
+
+
+def test_words__several_seeds_are_shown_each():
+    text = text_of(tame_in_one_seed())
     assert "Seed 1: yes." in text
     assert "Seed 2: no difference." in text
 
@@ -203,8 +172,6 @@ def test_words__only_significant_is_a_yes(verdict, question, small):
     for text in (found.sentence, found.speed):
         if verdict in (Verdict.NO_DIFFERENCE, Verdict.ALL_EQUAL, Verdict.NOT_ENOUGH_PAIRS):
             assert "significantly" not in text
-    if verdict is Verdict.NOT_SIGNIFICANT:
-        assert CHANCE in found.sentence
 
 
 SPEEDS = {"mean_speed_mps": 13.5}
@@ -261,21 +228,20 @@ def test_numbers__that_round_to_0_keep_their_sign(value, text):
     assert signed(value, 2) == text
 
 
-def test_p_values__are_never_rounded_to_0_or_1():
+def test_numbers__have_a_typographic_form():
     assert [p_number(p) for p in (0.00031, 0.0123, 0.5, 1.0)] == ["0.0003", "0.0123", "0.5", "1"]
-    assert p_text(1e-30) == "p\N{NO-BREAK SPACE}<\N{NO-BREAK SPACE}0.0001"
+    assert p_text(1e-30) == "p\N{NO-BREAK SPACE}<\N{NO-BREAK SPACE}0.0001", "never rounded to 0 or 1"
     assert p_number(0.99999) == ">\N{NO-BREAK SPACE}0.999"
     assert (p_number(math.nan), p_text(math.nan)) == ("–", "no p-value")
-
-
-def test_numbers__have_a_typographic_form():
     assert (number(-1.5, 1), number(-0.001, 2), number(math.nan, 1)) == ("\N{MINUS SIGN}1.5", "0.00", "–")
-    assert [percent(share) for share in (0.25, 0.0362, 1)] == [
-        f"{text}\N{NO-BREAK SPACE}%" for text in ("25", "3.6", "100")
-    ]
-    assert [duration(s) for s in (12.34, 59.99, 185, 3725, None)] == [
-        "12.3 s", "1 min 00 s", "3 min 05 s", "1 h 02 min", "–",
-    ]  # fmt: skip
+    assert [percent(share)[:-2] for share in (0.25, 0.0362, 1)] == ["25", "3.6", "100"]
+    durations = ["12.3 s", "1 min 00 s", "3 min 05 s", "1 h 02 min", "–"]
+    assert [duration(s) for s in (12.34, 59.99, 185, 3725, None)] == durations
+
+
+def test_p_values__are_also_shown_after_holms_correction():
+    row = {"p_value": 0.004, "p_holm": 0.025}
+    assert p_values(row).replace("\N{NO-BREAK SPACE}", " ") == "p = 0.004; p = 0.025 after Holm's correction"
 
 
 @pytest.mark.parametrize(
@@ -299,16 +265,20 @@ def test_effect__names_the_direction_it_has(question, metric, mean, words):
 # --- banners ---
 
 
-def test_banner__stages_that_are_not_done_are_named_with_their_message(page):
+def test_banner__stages_and_games_that_failed_are_named_with_their_message(page):
     arguments = campaign()
-    stages = arguments["manifest"]["stages"]
+    stages, rows = arguments["manifest"]["stages"], arguments["episodes"]
     stages["retrained_speedy-seed1"] |= {"status": "failed", "message": "the worker <died>"}
     stages["retrained_vs_speedy-seed1"] |= {"status": "pending", "seconds": None}
-    text = text_of(arguments)
+    text = text_of(with_errors(arguments, (rows["arm"] == "naive_vs_speedy") & (rows["episode"] < 3)))
     assert f"2 of {len(stages)} stages are not done." in text
     assert "retrained_speedy-seed1: failed: the worker <died>" in text
     assert "retrained_vs_speedy-seed1: pending" in text
+    assert f"3 of {len(rows)} games could not be played." in text
+    assert "naive_vs_speedy, seed 1: 3" in text
+    assert "3 games: the simulator died" in text
     assert "not done" not in page.text
+    assert "could not be played." not in page.text.split("Figures")[0]
 
 
 def test_next_steps__a_person_that_did_not_learn_may_imitate_a_driver(page):
@@ -325,16 +295,6 @@ def test_next_steps__a_person_that_did_not_learn_may_imitate_a_driver(page):
     assert "Does this person cause failures?" in on_foot
 
 
-def test_banner__games_that_could_not_be_played_are_counted_by_arm(page):
-    arguments = campaign()
-    rows = arguments["episodes"]
-    text = text_of(with_errors(arguments, (rows["arm"] == "naive_vs_speedy") & (rows["episode"] < 3)))
-    assert f"3 of {len(rows)} games could not be played." in text
-    assert "naive_vs_speedy, seed 1: 3" in text
-    assert "3 games: the simulator died" in text
-    assert "could not be played." not in page.text.split("Figures")[0]
-
-
 # --- replays ---
 
 
@@ -348,16 +308,13 @@ def test_replays__are_worst_first_as_the_command_lists_them(small, page):
     assert f"{len(expected) - REPLAYS_SHOWN} more games are in replays" in page.text
 
 
-def test_replays__each_has_the_command_that_opens_it(page):
+def test_replays__each_has_the_command_that_opens_it(small, page):
     assert "harness replay . naive_vs_speedy 6" in page.text
     assert "--seed" not in page.text
     assert "harness replay . naive_vs_speedy 6 --seed 2" in text_of(campaign(personas=["speedy"], seeds=(1, 2)))
-
-
-def test_replays__those_that_the_page_can_play_are_links(small):
-    html = without_curves(small | recordings(small))
-    assert '<a href="#game=naive_vs_speedy,1,6">naive_vs_speedy, game 6</a>' in html
-    assert '<a href="#game=naive' not in without_curves(small)
+    link = '<a href="#game=naive_vs_speedy,1,6">naive_vs_speedy, game 6</a>'
+    assert link in without_curves(small | recordings(small))
+    assert link not in without_curves(small)
 
 
 # --- the file itself ---
@@ -366,20 +323,6 @@ def test_replays__those_that_the_page_can_play_are_links(small):
 def test_page__is_the_same_bytes_for_the_same_input(small):
     once, again = (without_curves(small | recordings(small)) for _ in range(2))
     assert once == again
-
-
-def test_page__names_from_documents_stay_text():
-    hostile = "<script>alert(1)</script>"
-    arguments = campaign(personas=[hostile, "\"><img src=x onerror='alert(2)'>", "$\\frac{"])
-    arguments["manifest"]["name"] = hostile
-    arguments["manifest"]["versions"] |= {hostile: hostile}
-    with_errors(arguments, arguments["episodes"]["episode"] == 0)
-    html = rendered(**arguments, **recordings(arguments))
-    page = Page(html)
-    assert hostile in page.text
-    assert {tag for tag, _ in page.tags}.isdisjoint({"img", "iframe", "object", "link", "base"})
-    assert [tag for tag, _ in page.tags].count("script") == 6  # two tables, games, games elsewhere, libraries, own
-    assert not [name for _, attributes in page.tags for name in attributes if name.startswith("on")]
 
 
 def test_page__loads_nothing(html, page):
@@ -394,11 +337,12 @@ def test_page__loads_nothing(html, page):
     assert policy.startswith("default-src 'none'")
 
 
-def test_page__every_id_is_there_once_and_every_reference_has_one(html, page):
+def test_page__every_id_is_there_once_and_every_reference_leads_to_one(html, page):
+    """A published page stands alone: what lies beside it in the run folder is not there."""
     ids = [attributes["id"] for _, attributes in page.tags if "id" in attributes]
     assert len(ids) == len(set(ids))
-    targets = {a["href"][1:] for _, a in page.tags if a.get("href", "").startswith("#")}
-    assert targets | set(re.findall(r"url\(#([^)]*)\)", html)) <= set(ids)
+    links = {a["href"] for _, a in page.tags if "href" in a} | set(re.findall(r"url\((#[^)]*)\)", html))
+    assert links <= {f"#{each}" for each in ids}
 
 
 def test_page__every_figure_says_what_it_shows(page):

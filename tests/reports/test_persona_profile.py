@@ -33,7 +33,7 @@ from harness.reports.persona.profile import (
     persona_profile,
 )
 from tests.support.bicycle import advance, state_of
-from tests.support.chromium import launched, opener
+from tests.support.chromium import opener
 from tests.support.tiny import CAREFUL, DISTRACTED, SPEEDY
 
 TEXTING = Attention(mean_attentive_s=4.0, lapse_s=(4.0, 6.0), crown_steering_rad=0.005, bump_steering_sd_rad=0.001)
@@ -239,11 +239,11 @@ def test_page__is_not_written_over_a_document(tmp_path: Path) -> None:
         write_profile(invented(), tmp_path / "no" / "anna.html")
 
 
-def test_page__opens_in_dark_and_light_loads_nothing_and_does_not_scroll_sideways(tmp_path: Path) -> None:
+def test_page__opens_in_dark_and_light_loads_nothing_and_does_not_scroll_sideways(browser: Any, tmp_path: Path) -> None:
     file = tmp_path / "profile.html"
     fuzzy = read_document(SPEEDY, Persona).model_dump(exclude_none=True)["human"]
     write_profile(invented(human=fuzzy, attention={"mean_attentive_s": 5.0, "lapse_s": [4.0, 6.0]}), file)
-    with launched() as browser, opener(browser, file) as open_page:
+    with opener(browser, file) as open_page:
         for scheme in ("light", "dark"):
             page = open_page(color_scheme=scheme)
             assert page.title() == "anna: persona"

@@ -7,18 +7,12 @@ import re
 import pytest
 
 from harness.reports.player_data import key
-from tests.support.chromium import launched, opener, ready_s, until
+from tests.support.chromium import ready_s, until
 from tests.support.pages import blank_figures, campaign, recordings, rendered
 from tests.support.recorded import STEP_S, recorded
 from tests.support.repository import REPOSITORY
 
 GAME, OTHER = "naive_vs_speedy,1,6", "retrained_vs_speedy,1,6"  # a collision, and the same episode after retraining
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with launched() as browser:
-        yield browser
 
 
 @pytest.fixture(scope="module")
@@ -34,22 +28,18 @@ def games(arguments):
 
 
 @pytest.fixture(scope="module")
-def report(arguments, tmp_path_factory):
-    path = tmp_path_factory.mktemp("report") / "report.html"
-    path.write_text(rendered(**arguments, **recordings(arguments)), encoding="utf-8")
-    return path
+def report(arguments, write_report):
+    return write_report(arguments)
 
 
 @pytest.fixture
-def opened(browser, report):
-    with opener(browser, report) as open_page:
+def player(opened):
+    def open_player(fragment=f"#game={GAME}&t=2", **settings):
+        page = opened(fragment=fragment, **settings)
+        page.wait_for_selector(".player[data-ready]")
+        return page
 
-        def open_player(fragment=f"#game={GAME}&t=2", **settings):
-            page = open_page(fragment=fragment, **settings)
-            page.wait_for_selector(".player[data-ready]")
-            return page
-
-        yield open_player
+    return open_player
 
 
 def time_of(page):
@@ -72,8 +62,8 @@ def scrub(page, time_s):
 # --- the clock ---
 
 
-def test_player__plays_and_pauses_without_an_error_or_a_request(opened):
-    page = opened()
+def test_player__plays_and_pauses_without_an_error_or_a_request(player):
+    page = player()
     page.get_by_role("button", name="Play", exact=True).last.click()
     until(page, "() => Number(document.querySelector('.player').dataset.time) > 2.3")
     page.locator(".player [data-do=play]").click()
@@ -83,8 +73,8 @@ def test_player__plays_and_pauses_without_an_error_or_a_request(opened):
     assert page.seen == []
 
 
-def test_player__stops_at_the_end_and_restarts(opened, games):
-    page = opened(f"#game={GAME}&t={games[GAME].steps * STEP_S - 0.2}")
+def test_player__stops_at_the_end_and_restarts(player, games):
+    page = player(f"#game={GAME}&t={games[GAME].steps * STEP_S - 0.2}")
     press(page, "Space")
     until(page, "() => document.querySelector('[data-do=play]').textContent === 'Play'")
     assert time_of(page) == pytest.approx(games[GAME].steps * STEP_S)
@@ -103,9 +93,9 @@ SPEED_MEASURED = """async () => {
 
 
 @pytest.mark.parametrize("speed", ["0.25", "4"])
-def test_player__speed_is_the_speed_of_the_clock(opened, speed):
+def test_player__speed_is_the_speed_of_the_clock(player, speed):
     for _ in range(5):  # frames that a busy machine leaves out slow the player down: one undisturbed second is enough
-        page = opened("#game=retrained_vs_speedy,1,6&t=0")
+        page = player("#game=retrained_vs_speedy,1,6&t=0")
         page.locator("[data-is=speed]").select_option(speed)
         advanced = page.evaluate(SPEED_MEASURED)
         if advanced == pytest.approx(float(speed), rel=0.35):
@@ -113,8 +103,8 @@ def test_player__speed_is_the_speed_of_the_clock(opened, speed):
     assert advanced == pytest.approx(float(speed), rel=0.35)
 
 
-def test_player__keys_step_one_frame_jump_a_second_and_go_to_the_ends(opened, games):
-    page = opened()
+def test_player__keys_step_one_frame_jump_a_second_and_go_to_the_ends(player, games):
+    page = player()
     for pressed, expected in (
         ("Period", 2.1),
         ("Period", 2.2),
@@ -127,14 +117,6 @@ def test_player__keys_step_one_frame_jump_a_second_and_go_to_the_ends(opened, ga
     ):
         press(page, pressed)
         assert time_of(page) == pytest.approx(expected, abs=1e-6), pressed
-
-
-def test_player__the_slider_shows_the_values_of_its_time(opened, games):
-    page = opened()
-    ego = games[GAME].players[0]
-    for step in (5, 33, 61):
-        scrub(page, step * STEP_S)
-        assert page.locator(".values .of-ego").inner_text().startswith(f"ego {ego.speed_mps[step]:.1f} m/s")
 
 
 # --- the road ---
@@ -171,8 +153,8 @@ def colour(page, name):
 
 
 @pytest.mark.parametrize("settings", [{}, {"color_scheme": "dark"}, {"width": 400, "device_scale_factor": 2}])
-def test_road__cars_are_where_the_trace_has_them(opened, games, settings):
-    page = opened(**settings)
+def test_road__cars_are_where_the_trace_has_them(player, games, settings):
+    page = player(**settings)
     names = {"ego": "--ego", "non_ego": "--non-ego"}
     for step in (3, 27, 48, 60):
         scrub(page, step * STEP_S)
@@ -185,8 +167,8 @@ def test_road__cars_are_where_the_trace_has_them(opened, games, settings):
         assert asphalt == colour(page, "--asphalt")
 
 
-def test_road__between_two_steps_a_car_is_between_its_places(opened, games):
-    page = opened()
+def test_road__between_two_steps_a_car_is_between_its_places(player, games):
+    page = player()
     ego = games[GAME].players[0]
     scrub(page, 2.0)
     page.locator("[data-is=time]").evaluate("slider => { slider.step = 'any'; }")
@@ -196,8 +178,8 @@ def test_road__between_two_steps_a_car_is_between_its_places(opened, games):
     assert pixel(page, 0, ahead, ego.y_m[20]) != colour(page, "--asphalt")
 
 
-def test_road__follows_the_players_or_shows_the_whole_road_and_zooms(opened):
-    page = opened()
+def test_road__follows_the_players_or_shows_the_whole_road_and_zooms(player):
+    page = player()
 
     def scale():
         return float(page.locator(".view").get_attribute("data-camera").split()[2])
@@ -215,8 +197,8 @@ def test_road__follows_the_players_or_shows_the_whole_road_and_zooms(opened):
 # --- two games ---
 
 
-def test_side_by_side__games_have_the_same_time(opened, games):
-    page = opened()
+def test_side_by_side__games_have_the_same_time(player, games):
+    page = player()
     press(page, "b")
     page.wait_for_selector(".screens.two")
     assert [page.locator(".screen h3").nth(n).inner_text().split(",")[0] for n in (0, 1)] == [
@@ -239,23 +221,23 @@ def test_side_by_side__games_have_the_same_time(opened, games):
     page.wait_for_selector(".screens:not(.two)")
 
 
-def test_one_road__shows_the_other_game_as_ghosts(opened, games):
-    page = opened(f"#game={GAME}&t=4&with={OTHER}")
+def test_one_road__shows_the_other_game_as_ghosts(player, games):
+    page = player(f"#game={GAME}&t=4&with={OTHER}")
     assert page.locator(".screen:visible").count() == 2
     page.locator("[data-do=road]").click()
     assert page.locator(".screen:visible").count() == 1
     ghost = games[OTHER].players[1]
     place = ghost.x_m[40] + 1.2, ghost.y_m[40] - 0.5
     assert pixel(page, 0, *place) not in (colour(page, "--asphalt"), colour(page, "--non-ego"))
-    again = opened(page.evaluate("location.hash"))
+    again = player(page.evaluate("location.hash"))
     assert again.locator(".screen:visible").count() == 1
 
 
 # --- the list of games ---
 
 
-def test_list__next_follows_its_order_and_its_filter(opened, games):
-    page = opened()
+def test_list__next_follows_its_order_and_its_filter(player, games):
+    page = player()
     page.locator(".games-list summary").click()
     page.locator(".games-list [data-is=outcome]").select_option("rail contact")
     page.get_by_role("columnheader", name="least TTC").locator(".dt-column-order").click()
@@ -272,8 +254,8 @@ def test_list__next_follows_its_order_and_its_filter(opened, games):
 # --- figures ---
 
 
-def test_figure__a_dot_names_its_game_and_opens_it(opened):
-    page = opened("")
+def test_figure__a_dot_names_its_game_and_opens_it(player):
+    page = player("")
     page.locator("#figures > details > summary").click()
     dot = page.locator(f'#figures svg a[href="#game={OTHER}"]').first
     assert dot.get_attribute("aria-label").startswith("retrained_vs_speedy, game 6: ")
@@ -285,8 +267,8 @@ def test_figure__a_dot_names_its_game_and_opens_it(opened):
 # --- addresses ---
 
 
-def test_link__reopens_the_games_at_the_moment(opened):
-    page = opened()
+def test_link__reopens_the_games_at_the_moment(player):
+    page = player()
     press(page, "b")
     page.wait_for_selector(".screens.two")
     scrub(page, 3.2)
@@ -294,7 +276,7 @@ def test_link__reopens_the_games_at_the_moment(opened):
     until(page, "() => document.querySelector('[data-is=status]').textContent.includes('link to this moment')")
     fragment = page.evaluate("location.hash")
     assert fragment == f"#game={GAME}&t=3.2&with={OTHER}"
-    again = opened(fragment)
+    again = player(fragment)
     assert time_of(again) == pytest.approx(3.2)
     assert again.locator(".screen").count() == 2
     assert again.locator(".player").get_attribute("data-game") == GAME
@@ -303,22 +285,22 @@ def test_link__reopens_the_games_at_the_moment(opened):
     assert -5 < box["y"] < 200
 
 
-def test_link__to_a_missing_game_shows_a_message(opened):
-    page = opened("#game=naive_vs_nobody,1,3&t=2")
+def test_link__to_a_missing_game_shows_a_message(player):
+    page = player("#game=naive_vs_nobody,1,3&t=2")
     until(page, "() => document.querySelector('[data-is=status]').textContent.includes('does not contain that game')")
     assert page.locator(".screen").count() == 1
     assert page.seen == []
 
 
 @pytest.mark.parametrize("fragment", ["#game=", "#game=%E0%A4%A,1,1", "#figures", "#game=a,b,c&t=x&with=%"])
-def test_link__nonsense_is_harmless(opened, fragment):
-    page = opened(fragment)
+def test_link__nonsense_is_harmless(player, fragment):
+    page = player(fragment)
     assert page.locator(".screen").count() == 1
     assert page.seen == []
 
 
-def test_marks__a_manoeuvre_seeks_to_its_time(opened):
-    page = opened()
+def test_marks__a_manoeuvre_seeks_to_its_time(player):
+    page = player()
     page.get_by_role("button", name="4.0 s speedy: cut-in").click()
     assert time_of(page) == pytest.approx(4.0)
 
@@ -326,8 +308,8 @@ def test_marks__a_manoeuvre_seeks_to_its_time(opened):
 # --- the cards' animations ---
 
 
-def test_clip__plays_by_itself_and_opens_in_the_player(opened):
-    page = opened("")
+def test_clip__plays_by_itself_and_opens_in_the_player(player):
+    page = player("")
     clip = page.locator(".clip").first
     until(page, "() => Number(document.querySelector('.clip').dataset.time) > 0.3")
     clip.get_by_role("link").click()
@@ -336,8 +318,8 @@ def test_clip__plays_by_itself_and_opens_in_the_player(opened):
     until(page, "() => Number(document.querySelector('.player').dataset.time) > 0.2")
 
 
-def test_clip__does_not_move_with_reduced_motion(opened):
-    page = opened("", reduced_motion="reduce")
+def test_clip__does_not_move_with_reduced_motion(player):
+    page = player("", reduced_motion="reduce")
     page.wait_for_selector(".clip[data-time]")
     before = page.locator(".clip").first.get_attribute("data-time")
     page.wait_for_timeout(250)
@@ -349,23 +331,14 @@ def test_clip__does_not_move_with_reduced_motion(opened):
 # --- the page it is in ---
 
 
-def test_page__of_a_campaign_is_soon_interactive(browser, tmp_path):
+def test_page__of_a_campaign_weighs_little_and_is_soon_interactive(opened, write_report):
     arguments = campaign(games=100)
-    path = tmp_path / "report.html"
-    path.write_text(rendered(**arguments, **recordings(arguments, background=6)), encoding="utf-8")
-    with opener(browser, path) as open_page:
-        page = open_page()
-        assert ready_s(page) < 2.0
-        until(page, "() => document.querySelector('[data-is=place]').textContent !== ''")
-        assert page.locator("[data-is=arm] option").count() == 1 + arguments["episodes"]["arm"].nunique()
-
-
-@pytest.mark.parametrize(("personas", "seeds", "most_mb"), [(2, 1, 2.0), (3, 3, 3.0)])
-def test_page__weighs_little(personas, seeds, most_mb):
-    """One seed and two personas, as `merge`; three of each, as `zebra`."""
-    arguments = campaign(personas=["speedy", "distracted", "anna"][:personas], seeds=range(1, seeds + 1), games=100)
-    html = rendered(**arguments, **recordings(arguments, background=6))
-    assert len(html.encode()) <= most_mb * 1e6
+    path = write_report(arguments, **recordings(arguments, background=6))
+    assert path.stat().st_size <= 2e6
+    page = opened(path)
+    assert ready_s(page) < 2.0
+    until(page, "() => document.querySelector('[data-is=place]').textContent !== ''")
+    assert page.locator("[data-is=arm] option").count() == 1 + arguments["episodes"]["arm"].nunique()
 
 
 def test_page__games_that_do_not_fit_stay_in_the_run_folder(arguments, monkeypatch):

@@ -19,26 +19,20 @@ def stages(**made_by: Any) -> dict[str, dict[str, Any]]:
     return {name: {"status": "done", "versions": versions} for name, versions in made_by.items()}
 
 
-def test_mixed_versions__of_one_version_there_is_no_warning() -> None:
+def test_mixed_versions__names_only_the_differences_of_stages_that_are_done() -> None:
     assert mixed_versions({}) == []
-    assert mixed_versions(stages(a=[NEW], b=[NEW])) == []
-
-
-def test_mixed_versions__names_only_the_differences() -> None:
-    assert mixed_versions(stages(a=[NEW], b=[OLD], c=[NEW])) == [
+    assert mixed_versions(stages(a=[NEW], b=[NEW], search=[{**NEW, "optuna": "5.0.0"}])) == []
+    others = {
+        "pending": {"status": "pending", "versions": [OLD]},
+        "unknown": {"status": "done"},
+        "damaged": {"status": "done", "versions": 7},
+    }
+    assert mixed_versions(stages(a=[NEW]) | others) == []
+    assert mixed_versions(stages(a=[NEW], b=[OLD], c=[NEW]) | others) == [
         MIXED_VERSIONS,
         "  by numpy 2.2.6: a, c",
         "  by numpy 2.1.0: b",
     ]
-
-
-def test_mixed_versions__stages_that_are_not_done_or_of_no_known_versions_do_not_count() -> None:
-    others = {
-        "b": {"status": "pending", "versions": [OLD]},
-        "c": {"status": "done"},
-        "d": {"status": "done", "versions": 7},
-    }
-    assert mixed_versions(stages(a=[NEW]) | others) == []
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ from harness.evaluation.strategies import ReconfiguredEgo, against_persona
 from harness.evaluation.tables import table_of
 from harness.reports.cards import STILL_DRIVES
 from harness.reports.learning import searches
-from harness.reports.provenance import mixed_versions, rounds
+from harness.reports.provenance import rounds
 from harness.reports.run_tables import QUESTIONS, RECONFIGURED
 from tests.support.pages import campaign, rendered
 
@@ -26,13 +26,8 @@ def trials(seed: int = 1, payoffs: tuple[float, ...] = PAYOFFS, error: str = "Va
     chosen = payoffs.index(max(each for each in payoffs if not math.isnan(each)))
     rows = [
         {
-            **{
-                "stage": "reconfigured_speedy",
-                "persona": "speedy",
-                "seed": seed,
-                "trial": trial,
-                "chosen": trial == chosen,
-            },
+            **{"stage": "reconfigured_speedy", "persona": "speedy", "seed": seed},
+            **{"trial": trial, "chosen": trial == chosen},
             **{"parameter": name, "value": 1.5 + 0.25 * trial, "low": -1.0, "high": 3.0},
             **{"mean_payoff": payoff, "failure_rate": 0.125, "best_payoff": max(payoffs[: trial + 1], key=_or_least)},
             "error": error if math.isnan(payoff) else "",
@@ -95,13 +90,3 @@ def test_searches__in_words() -> None:
     assert found["document"] == "policies/reconfigured_speedy-seed1/driver.toml"
     (found,) = searches(trials(payoffs=(3.0, 1.0, 3.0)))
     assert found["summary"] == "3 trials, none better than the ego as given: mean payoff 3.00, failures in 12.5 %."
-
-
-def test_mixed_versions__programs_of_searches_are_compared_among_searches() -> None:
-    def stage(kind: str, **versions: str) -> dict[str, Any]:
-        return {"status": "done", "kind": kind, "versions": [versions]}
-
-    arm, search = stage("assessment", python="3.11"), stage("reconfiguration", python="3.11", optuna="5.0.0")
-    assert mixed_versions({"a": arm, "b": search}) == []
-    other = stage("reconfiguration", python="3.11", optuna="5.1.0")
-    assert mixed_versions({"a": arm, "b": search, "c": other})[1:] == ["  by optuna 5.0.0: b", "  by optuna 5.1.0: c"]

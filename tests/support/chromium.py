@@ -6,9 +6,10 @@ Without Playwright or Chromium these tests are skipped; with HARNESS_REQUIRE_BRO
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
@@ -100,6 +101,34 @@ def until(page: Any, expression: str, argument: Any = None, seconds: float = 300
         if time.monotonic() > end:
             pytest.fail(f"not true within {seconds:g} s: {expression}")
         page.wait_for_timeout(20)
+
+
+def unfold(page: Any) -> None:
+    """Open everything that is folded, and wait until the tables have their rows."""
+    page.evaluate("for (const each of document.querySelectorAll('details')) each.open = true;")
+    until(page, "() => [...document.querySelectorAll('table.data')].every(table => 'ready' in table.dataset)")
+
+
+COLOURS = """element => {
+  const style = getComputedStyle(element), paints = each => !/, 0\\)$/.test(getComputedStyle(each).backgroundColor);
+  let ground = element;
+  while (ground && !paints(ground)) ground = ground.parentElement;
+  return [element instanceof SVGElement ? style.fill : style.color, getComputedStyle(ground).backgroundColor];
+}"""
+"""The colours of an element's text, and of the first ground behind it that is not transparent."""
+
+
+def rgb(colour: str) -> list[float]:
+    """The parts of a CSS colour without its opacity, 0 to 255."""
+    return [float(part) for part in re.findall(r"[\d.]+", colour)[:3]]
+
+
+def contrast(one: str | Sequence[float], other: str | Sequence[float]) -> float:
+    """WCAG's contrast ratio of two colours, of CSS or as their parts."""
+    parts = [rgb(each) if isinstance(each, str) else each for each in (one, other)]
+    linear = [[p / 3294.6 if p <= 10.01 else ((p / 255 + 0.055) / 1.055) ** 2.4 for p in each] for each in parts]
+    dark, bright = sorted(0.2126 * red + 0.7152 * green + 0.0722 * blue for red, green, blue in linear)
+    return (bright + 0.05) / (dark + 0.05)
 
 
 def accessibility_violations(page: Any) -> list[str]:

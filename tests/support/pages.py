@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from html.parser import HTMLParser
 from typing import Any
@@ -56,32 +56,26 @@ def campaign(
     `failing` overrides FAILING: the share of games the ego fails, by kind of arm.
     """
     rates = FAILING | (failing or {})
-    arms: list[tuple[str, str, str | None]] = [("naive_alone", "", "alone"), ("naive_vs_sumo", "", "sumo")]
-    stages = ["naive"]
+    arms: dict[Arm, tuple[str, str | None]] = {NAIVE_ALONE: ("", "alone"), NAIVE_VS_SUMO: ("", "sumo")}
+    strategies: list[Strategy] = [NaiveEgo()]
     for persona in personas:
-        arms += [(f"{persona}_alone", persona, None), (f"naive_vs_{persona}", persona, "naive")]
-        stages.append(persona)
+        arms |= {persona_alone(persona): (persona, None), against_persona(NaiveEgo(), persona): (persona, "naive")}
+        strategies.append(PersonaNonEgo(persona=persona))
         if retrained:
-            arms += [
-                (f"retrained_vs_{persona}", persona, "retrained"),
-                (f"retrained_alone_{persona}", persona, "alone"),
-            ]
-            stages.append(f"retrained_{persona}")
+            ego = RetrainedEgo(against=persona)
+            arms |= {against_persona(ego, persona): (persona, "retrained"), Arm(ego=ego): (persona, "alone")}
+            strategies.append(ego)
     random = np.random.default_rng(7)
     rows = [
-        _game(arm, persona, seed, episode, rates.get(kind or ""), random)
-        for arm, persona, kind in arms
+        _game(arm.name, persona, seed, episode, rates.get(kind or ""), random)
+        for arm, (persona, kind) in arms.items()
         for seed in seeds
         for episode in range(games)
     ]
     episodes = table_of("episodes", rows)
-    questions = [
-        Question(question=question, persona=persona, seed=seed, baseline=before, treatment=after)
-        for persona in personas
-        for seed in seeds
-        for question, before, after in _asked(persona)
-        if question == "RQ1" or retrained
-    ]
+    asked: Sequence[ResearchQuestion] = ("RQ1", "RQ2") if retrained else ("RQ1",)
+    questions = _questions([(question, persona, seed) for persona in personas for seed in seeds for question in asked])
+    stages = [strategy_name(each) for each in strategies]
     training = pd.DataFrame([row for stage in stages for seed in seeds for row in _windows(stage, seed, random)])
     manifest = {
         "format": 1,
@@ -98,15 +92,15 @@ def campaign(
             "assessment": {"episodes": games, "significance": 0.01},
         },
         "stages": {f"{stage}-seed{seed}": _training_stage(seed) for stage in stages for seed in seeds}
-        | {f"{arm}-seed{seed}": _done(seed) for arm, _, _ in arms for seed in seeds},
+        | {f"{arm.name}-seed{seed}": _done(seed) for arm in arms for seed in seeds},
     }
     replays = [
         replay_name(game["arm"], game["seed"], game["episode"]) for game in choose_games(episodes).to_dict("records")
     ]
     return {
         "manifest": manifest,
-        "arms": {arm.name: arm for persona in personas for arm in _arms(persona)},
-        "strategies": {strategy_name(each): each for persona in personas for each in _strategies(persona)},
+        "arms": {arm.name: arm for arm in arms},
+        "strategies": {strategy_name(each): each for each in strategies},
         "episodes": episodes,
         "summary": summarise(episodes),
         "comparisons": compare(questions, episodes, 0.01),
@@ -115,21 +109,25 @@ def campaign(
     }
 
 
-def _arms(persona: str) -> list[Arm]:
-    naive, retrained = NaiveEgo(), RetrainedEgo(against=persona)
-    pairs = [against_persona(ego, persona) for ego in (naive, retrained)]
-    return [NAIVE_ALONE, NAIVE_VS_SUMO, persona_alone(persona), *pairs, Arm(ego=retrained)]
-
-
-def _strategies(persona: str) -> list[Strategy]:
-    return [NaiveEgo(), PersonaNonEgo(persona=persona), RetrainedEgo(against=persona)]
-
-
-def _asked(persona: str) -> list[tuple[ResearchQuestion, str, str]]:
-    return [
-        ("RQ1", "naive_alone", f"naive_vs_{persona}"),
-        ("RQ2", f"naive_vs_{persona}", f"retrained_vs_{persona}"),
-    ]
+def _questions(
+    asked: Iterable[tuple[ResearchQuestion, str, int]], competence: Mapping[str, float] = UNGATED
+) -> list[Question]:
+    """These questions about a persona and seed; `competence` is the table of a campaign."""
+    document = {"name": "a", "scene": "b", "personas": ["x.toml"], "competence": competence}
+    campaign, questions = Campaign.model_validate(document), []
+    for question, persona, seed in asked:
+        naive = against_persona(NaiveEgo(), persona)
+        arms = (
+            [NAIVE_ALONE, naive]
+            if question == "RQ1"
+            else [naive, against_persona(RetrainedEgo(against=persona), persona)]
+        )
+        before, after = (arm.name for arm in arms)
+        alone = alone_bounds(campaign, naive)
+        questions.append(
+            Question(question=question, persona=persona, seed=seed, baseline=before, treatment=after, alone=alone)
+        )
+    return questions
 
 
 def _game(
@@ -261,38 +259,10 @@ def with_errors(arguments: dict[str, Any], games: Any) -> dict[str, Any]:
     return recomputed(arguments)
 
 
-CONTRAST = """element => {
-  const parse = colour => colour.match(/[\\d.]+/g).map(Number);
-  const luminance = colour => {
-    const [r, g, b] = parse(colour).map(part => part / 255)
-      .map(part => part <= 0.03928 ? part / 12.92 : ((part + 0.055) / 1.055) ** 2.4);
-    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
-  };
-  const style = getComputedStyle(element);
-  const ink = luminance(element instanceof SVGElement ? style.fill : style.color);
-  let ground = element;
-  while (ground && (parse(getComputedStyle(ground).backgroundColor)[3] ?? 1) === 0) ground = ground.parentElement;
-  const paper = luminance(getComputedStyle(ground).backgroundColor);
-  return (Math.max(ink, paper) + 0.05) / (Math.min(ink, paper) + 0.05);
-}"""
-"""WCAG's contrast ratio of an element's text with the first ground behind it that is not transparent."""
-
-
 def recomputed(arguments: dict[str, Any], competence: Mapping[str, float] = UNGATED) -> dict[str, Any]:
     """The campaign with tables that fit its changed episodes; `competence` is its table of that name."""
-    asked = Campaign.model_validate({"name": "a", "scene": "b", "personas": ["x.toml"], "competence": competence})
     old = arguments["comparisons"]
-    questions = [
-        Question(
-            question=row["question"],
-            persona=row["persona"],
-            seed=row["seed"],
-            baseline="naive_alone" if row["question"] == "RQ1" else f"naive_vs_{row['persona']}",
-            treatment=f"{'naive' if row['question'] == 'RQ1' else 'retrained'}_vs_{row['persona']}",
-            alone=alone_bounds(asked, against_persona(NaiveEgo(), row["persona"])),
-        )
-        for row in old[old["metric"] == "failure"].to_dict("records")
-    ]
+    asked = old.loc[old["metric"] == "failure", ["question", "persona", "seed"]].itertuples(index=False, name=None)
     arguments["summary"] = summarise(arguments["episodes"])
-    arguments["comparisons"] = compare(questions, arguments["episodes"], 0.01)
+    arguments["comparisons"] = compare(_questions(asked, competence), arguments["episodes"], 0.01)
     return arguments

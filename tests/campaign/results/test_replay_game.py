@@ -62,26 +62,19 @@ def test_report__makes_tables_of_the_log_anew_without_playing_a_game(run: Path) 
 
 
 def test_game__is_made_from_its_trace_and_not_from_the_folder_replays(run: Path) -> None:
-    name = replay_name("naive_alone", 1, 3)
-    with replay_of(played_game(run, "naive_alone", 3, None)) as replay:
+    name, game = replay_name("naive_alone", 1, 3), played_game(run, "naive_alone", 3, None)
+    assert game.title == "naive_alone, seed 1, episode 3"
+    shutil.rmtree(run / "replays")
+    with replay_of(game) as replay:
         before = {file.name: file.read_bytes() for file in replay.iterdir()}
-    (run / "replays" / name).mkdir(exist_ok=True)
+        assert (replay.name, (run / "replays").exists()) == (name, False)
+    assert not replay.parent.exists()
+    (run / "replays" / name).mkdir(parents=True)
     # a configuration can make SUMO write anywhere, and the folder may come from another machine
     (run / "replays" / name / "scene.sumocfg").write_text("<configuration><log value='/tmp/mine'/></configuration>")
     with replay_of(played_game(run, "naive_alone", 3, 1)) as replay:
         assert {file.name: file.read_bytes() for file in replay.iterdir()} == before
-
-
-def test_game__needs_no_replay_folder(run: Path) -> None:
-    name = replay_name("naive_alone", 1, 3)
-    shutil.rmtree(run / "replays")
-    game = played_game(run, "naive_alone", 3, None)
-    assert game.title == "naive_alone, seed 1, episode 3"
-    with replay_of(game) as replay:
-        assert replay.name == name
-        assert (replay / "scene.sumocfg").is_file()
-        assert not (run / "replays").exists()
-    assert not replay.parent.exists()
+        assert "scene.sumocfg" in before
 
 
 def test_watch__without_a_screen_names_the_film(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
