@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,6 +21,7 @@ from safetensors.numpy import load as load_tensors
 from safetensors.numpy import save as save_tensors
 
 from harness.config.persona import Persona
+from harness.config.toml_reading import nearest
 from harness.errors import UsageError
 from harness.files import content_of, write_atomically
 from harness.game.arrays import FloatArray
@@ -31,6 +33,7 @@ ACTIONS = 2
 ARCHIVES = (".zip", ".pkl", ".pickle", ".pt", ".pth", ".ckpt", ".joblib", ".npy", ".npz", ".onnx")
 _MAX_TENSOR_BYTES, _MAX_CARD_BYTES = 100_000_000, 1_000_000
 _MAX_PARAMETER = 1e6  # a larger parameter is a sign of damage
+_LAYER = re.compile(r"(actor|critic)\.(\d{1,2})\.", re.ASCII)
 _POLICY_FOLDER = "name the folder of a policy, as under <run>/policies/"
 
 
@@ -54,12 +57,8 @@ class Policy:
 
     def layers(self, part: str) -> list[tuple[FloatArray, FloatArray]]:
         """Weights [out, in] and biases [out] of `actor` or `critic`, in order."""
-        each = range(self.depth(part))
-        return [(self.tensors[f"{part}.{k}.weight"], self.tensors[f"{part}.{k}.bias"]) for k in each]
-
-    def depth(self, part: str) -> int:
-        """The number of layers of `actor` or `critic`."""
-        return sum(name.startswith(f"{part}.") and name.endswith(".weight") for name in self.tensors)
+        count = sum(name.startswith(f"{part}.") and name.endswith(".weight") for name in self.tensors)
+        return [(self.tensors[f"{part}.{k}.weight"], self.tensors[f"{part}.{k}.bias"]) for k in range(count)]
 
 
 def write_policy(policy: Policy, folder: Path) -> None:
@@ -127,14 +126,13 @@ def _content(file: Path, max_bytes: int) -> bytes:
 
 def _check_tensors(policy: Policy) -> None:
     """Raises ValueError for parameters that are unknown, missing, of another shape, or no plausible numbers."""
-    layers = [f"{part}.{k}" for part in ("actor", "critic") for k in range(policy.depth(part))]
-    expected = {"log_deviation", *(f"{layer}.{kind}" for layer in layers for kind in ("weight", "bias"))}
-    for what, names in (
-        ("there are no parameters", expected - policy.tensors.keys()),
-        ("unknown parameters", policy.tensors.keys() - expected),
-    ):
-        if names:
-            raise ValueError(f"{what} {', '.join(repr(name[:100]) for name in sorted(names)[:5])}")
+    layers = [(match[1], int(match[2])) for match in map(_LAYER.match, policy.tensors) if match]
+    expected = {f"{part}.{k}.{kind}" for part, last in layers for k in range(last + 1) for kind in ("weight", "bias")}
+    expected.add("log_deviation")
+    for name in sorted(policy.tensors.keys() - expected):
+        raise ValueError(f"unknown parameters {name[:100]!r}: {nearest(name, expected)}")
+    for name in sorted(expected - policy.tensors.keys()):
+        raise ValueError(f"there are no parameters {name!r}")
     for part, outputs in (("actor", ACTIONS), ("critic", 1)):
         width = len(LAYOUT)
         for weight, bias in policy.layers(part):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,15 +13,13 @@ import pytest
 from harness.assessment import conformance
 from harness.assessment.conformance import check_conformance, difference_of
 from harness.config.campaign import LEARNED, SUMO
-from harness.drivers.car import Car, car_of
+from harness.drivers.car import car_of
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena
 from harness.game.arrays import FloatArray, IntArray
-from harness.game.initial_state import InitialState, draw_initial_state
-from harness.game.observation_layout import LAYOUT
+from harness.game.initial_state import draw_initial_state
 from harness.game.roles import EGO
 from harness.road.scene.open_scene import OpenScene
-from tests.support.repository import REPOSITORY
 from tests.support.tiny import harness
 
 
@@ -43,65 +42,12 @@ class Good:
         return actions
 
 
-class OneDimensional(Good):
-    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
-        return np.zeros(2)
-
-
-class ListReturning(Good):
-    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
-        return [[0.0, 0.0]]  # type: ignore[return-value]
-
-
-class NotFinite(Good):
-    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
-        return np.full((len(games), 2), np.nan)
-
-
-class OutOfBounds(Good):
-    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
-        return np.full((len(games), 2), 1.5)
-
-
-class Writing(Good):
-    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
-        observation *= 2.0
-        return np.zeros((len(games), 2))
-
-
-class Raising(Good):
-    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
-        if observation[0, LAYOUT.index("speed_mps")] >= 0.0:
-            raise KeyError("no such lane")
-        return super().decide(games, observation, noise)
-
-
-class WrongUnits(Good):
-    """Asks for 1e9 m/s²."""
-
-    def __init__(self, car: Car) -> None:
-        super().__init__()
-        self.car = car
-
-    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
-        return self.car.actions(np.full(len(games), 1e9), np.zeros(len(games)), observation)
-
-
 class Stale(Good):
     """Ignores resets: its second game continues the state of the first."""
 
     def reset(self, games: IntArray) -> None:
         for game in games.tolist():
             self.steps.setdefault(game, 0)
-
-
-class Random(Good):
-    def __init__(self) -> None:
-        super().__init__()
-        self.chance = np.random.default_rng(1)
-
-    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
-        return 0.01 * self.chance.standard_normal((len(games), 2)).clip(-1.0, 1.0)
 
 
 class Sharing(Good):
@@ -115,11 +61,35 @@ class Sharing(Good):
         return np.repeat(actions, len(games), axis=0)
 
 
-class Averaging(Good):
-    """Acts on the observations of all games."""
+CHANCE = np.random.default_rng(1)
+
+
+class Deciding(Good):
+    """Decides by a function of the observation."""
+
+    def __init__(self, decided: Callable[[FloatArray], Any]) -> None:
+        super().__init__()
+        self.decided = decided
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
-        return np.repeat(0.01 * observation.mean(axis=0, keepdims=True)[:, :2], len(games), axis=0).astype(float)
+        return self.decided(observation)  # type: ignore[no-any-return]
+
+
+def at_random(observation: FloatArray) -> FloatArray:
+    return 0.01 * CHANCE.standard_normal((len(observation), 2)).clip(-1.0, 1.0)
+
+
+def of_all_games(observation: FloatArray) -> FloatArray:
+    return np.repeat(0.01 * observation.mean(axis=0, keepdims=True)[:, :2], len(observation), axis=0).astype(float)
+
+
+def raising(observation: FloatArray) -> FloatArray:
+    raise KeyError("no such lane")
+
+
+def writing(observation: FloatArray) -> FloatArray:
+    observation *= 2.0
+    return np.zeros((len(observation), 2))
 
 
 def test_check__a_conforming_driver_passes(merge: OpenScene) -> None:
@@ -133,32 +103,34 @@ def test_check__a_conforming_driver_passes(merge: OpenScene) -> None:
 @pytest.mark.parametrize(
     ("driver", "message"),
     [
-        (OneDimensional, "it decided an array [2], not [1, 2]"),
-        (ListReturning, "it decided list, not a NumPy array"),
-        (NotFinite, "not finite"),
-        (OutOfBounds, "pedals and wheel are in -1 to 1"),
-        (Writing, "it modified the observation"),
-        (Raising, "playing, game 0, decision 0: it raised KeyError: 'no such lane'"),
-        (Stale, "it is not deterministic: in decision 0 of game 0"),
-        (Random, "it is not deterministic"),
-        (Sharing, "its games are not independent"),
-        (Averaging, "its games are not independent"),
+        (Deciding(lambda seen: np.zeros(2)), "it decided an array [2], not [1, 2]"),
+        (Deciding(lambda seen: [[0.0, 0.0]]), "it decided list, not a NumPy array"),
+        (Deciding(lambda seen: np.full((1, 2), np.nan)), "not finite"),
+        (Deciding(lambda seen: np.full((1, 2), 1.5)), "pedals and wheel are in -1 to 1"),
+        (Deciding(writing), "it modified the observation"),
+        (Deciding(raising), "playing, game 0, decision 0: it raised KeyError: 'no such lane'"),
+        (Deciding(at_random), "it is not deterministic"),
+        (Deciding(of_all_games), "its games are not independent"),
+        (Stale(), "it is not deterministic: in decision 0 of game 0"),
+        (Sharing(), "its games are not independent"),
     ],
 )
-def test_check__a_violation_is_named(driver: type[Good], message: str, merge: OpenScene) -> None:
-    (violation,) = check_conformance(driver(), merge, 2).violations
+def test_check__a_violation_is_named(driver: Good, message: str, merge: OpenScene) -> None:
+    (violation,) = check_conformance(driver, merge, 2).violations
     assert message in violation
 
 
 def test_check__an_implausible_request_is_named_with_its_unit(merge: OpenScene) -> None:
-    (violation,) = check_conformance(WrongUnits(car_of(merge.world, EGO)), merge, 2).violations
+    car = car_of(merge.world, EGO)
+    driver = Deciding(lambda seen: car.actions(np.full(len(seen), 1e9), np.zeros(len(seen)), seen))
+    (violation,) = check_conformance(driver, merge, 2).violations
     assert "it decided an acceleration of 1e+09 m/s², which is beyond ±100: is the unit right?" in violation
 
 
 def test_repeats__a_driver_that_varies_is_told_and_others_are_not(merge: OpenScene) -> None:
     assert difference_of(Good(), merge) == ""
-    assert "it is not deterministic: in decision 0 of game 0" in difference_of(Random(), merge)
-    assert difference_of(Raising(), merge) == "", "games that can't be played are told by the arms"
+    assert "it is not deterministic: in decision 0 of game 0" in difference_of(Deciding(at_random), merge)
+    assert difference_of(Deciding(raising), merge) == "", "games that can't be played are told by the arms"
 
 
 def write(folder: Path, change: str = "") -> Path:
@@ -196,11 +168,6 @@ def test_command__runs_no_program_without_permission(tmp_path: Path) -> None:
     assert not (tmp_path / "ran").exists()
 
 
-def test_command__checks_a_rule_based_driver() -> None:
-    done = harness("check-driver", REPOSITORY / "egos" / "adas.toml", "--games", 2)
-    assert done.returncode == 0, done.stdout + done.stderr
-
-
 def test_check__sumos_driver_passes_without_decisions(merge: OpenScene) -> None:
     found = check_conformance(SumoDriver(), merge, 2)
     assert found.violations == []
@@ -213,29 +180,24 @@ def test_check__sumos_driver_passes_without_decisions(merge: OpenScene) -> None:
 def test_check__another_motion_of_sumos_driver_is_a_violation(
     merge: OpenScene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    seeds = iter(range(4))
+    seeds = itertools.count()
     reload = Arena.reload
     monkeypatch.setattr(Arena, "reload", lambda arena, seed: reload(arena, next(seeds)))
-    monkeypatch.setattr(conformance, "draw_initial_state", different_states())
+    monkeypatch.setattr(
+        conformance, "draw_initial_state", lambda of, *parts: draw_initial_state(of, *parts, next(seeds))
+    )
     (violation,) = check_conformance(SumoDriver(), merge, 2).violations
     assert "it is not deterministic: game 0" in violation
 
 
-def different_states() -> Callable[..., InitialState]:
-    """`draw_initial_state` with another state at each call."""
-    count = itertools.count()
-    return lambda distribution, *parts: draw_initial_state(distribution, *parts, next(count))
-
-
-@pytest.mark.parametrize("form", ["name", "document"])
-def test_command__checks_sumos_driver(form: str, tmp_path: Path) -> None:
+def test_command__checks_a_driver_of_sumo(tmp_path: Path) -> None:
     (tmp_path / "car.toml").write_text('kind = "sumo"\nvehicle_type = "ego_car"\n')
-    driver = SUMO if form == "name" else tmp_path / "car.toml"
-    done = harness("check-driver", driver, "--games", 2)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert f"SUMO's own models of vehicle type ego_car ({driver}), on merge" in done.stdout
-    assert "the same games again: the same motion, bit for bit" in done.stdout
-    assert "games  goal, goal" in done.stdout
+    for driver in (SUMO, tmp_path / "car.toml"):
+        done = harness("check-driver", driver, "--games", 2)
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert f"SUMO's own models of vehicle type ego_car ({driver}), on merge" in done.stdout
+        assert "the same games again: the same motion, bit for bit" in done.stdout
+        assert "games  goal, goal" in done.stdout
 
 
 def test_command__has_nothing_to_check_before_the_training() -> None:

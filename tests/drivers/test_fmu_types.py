@@ -16,10 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.assessment.rollout import SeatedArm, assess
 from harness.config.driver import Fmu
-from harness.config.persona import Persona
-from harness.config.toml_reading import read_document
 from harness.drivers.car import Car, car_of
 from harness.drivers.fmu import fmu_driver, unconnected_inputs, wiring
 from harness.drivers.fmu_variables import INTEGERS
@@ -28,8 +25,7 @@ from harness.game.observation_layout import LAYOUT, SIZE
 from harness.game.roles import EGO
 from harness.road.scene.open_scene import OpenScene
 from tests.support.external_drivers import fmu_example
-from tests.support.rollouts import seated
-from tests.support.tiny import CAREFUL
+from tests.support.rollouts import arm, play
 
 NUMBERS = ("Float32", *INTEGERS[1:], "Boolean")
 SPEED, GAP = "speed_mps", "time_gap_s"
@@ -181,10 +177,8 @@ def test_reference_fmus__what_goes_in_comes_out(version: str, merge: OpenScene, 
     view = behind_a_car(car, 12.0)
     wanted = car.physical(view)[:, LAYOUT.index("speed_over_limit")]
     np.testing.assert_allclose(first_action(driver, view), car.actions(wanted, np.zeros(1), view), atol=1e-6)
-    careful = read_document(CAREFUL, Persona)
-    arm = SeatedArm(name="a", scene=merge, drivers=seated((driver, None), (careful, careful)), seed=1)
-    games = [game.record for game in assess(arm, 3)]
-    assert [(game["error"], game["ego_outcome"]) for game in games] == [("", "goal")] * 3
+    games = play(arm(merge, driver, None))
+    assert [(game.record["error"], game.record["ego_outcome"]) for game in games] == [("", "goal")] * 3
 
 
 def test_reference_fmus__arrays_are_refused() -> None:

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import json
-import pickle
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from safetensors.numpy import save
 
 from harness.drivers.policy_file import Policy, read_policy, write_policy
 from harness.errors import UsageError
-from harness.game.arrays import FloatArray
 from harness.game.observation_layout import SIZE
 from tests.support.policies import some_policy
 
@@ -43,72 +38,13 @@ def test_policy__equal_policies_are_equal_bytes(tmp_path: Path) -> None:
     assert (tmp_path / "a" / "policy.json").read_bytes() == (tmp_path / "b" / "policy.json").read_bytes()
 
 
-Damage = Callable[[Path, Path], object]
-
-
-def tensors_changed(**changes: FloatArray | None) -> Damage:
-    def damage(tensors: Path, card: Path) -> None:
-        changed = {**some_policy().tensors, **{name.replace("__", "."): value for name, value in changes.items()}}
-        tensors.write_bytes(save({name: value for name, value in changed.items() if value is not None}))
-
-    return damage
-
-
-def card_changed(**changes: object) -> Damage:
-    return lambda tensors, card: card.write_text(json.dumps({**json.loads(card.read_text()), **changes}))
-
-
-NAN, ZEROS = np.full(2, np.nan, np.float32), np.zeros
-DAMAGE: dict[str, tuple[str, Damage]] = {
-    "no tensors": ("policy.safetensors", lambda tensors, card: tensors.unlink()),
-    "no card": ("policy.json", lambda tensors, card: card.unlink()),
-    "a folder in place of the tensors": (
-        "policy.safetensors",
-        lambda tensors, card: (tensors.unlink(), tensors.mkdir()),
-    ),
-    "truncated": ("policy.safetensors", lambda tensors, card: tensors.write_bytes(tensors.read_bytes()[:-1])),
-    "truncated header": ("policy.safetensors", lambda tensors, card: tensors.write_bytes(tensors.read_bytes()[:20])),
-    "empty": ("policy.safetensors", lambda tensors, card: tensors.write_bytes(b"")),
-    "zeros": ("policy.safetensors", lambda tensors, card: tensors.write_bytes(bytes(200))),
-    "a huge header": ("policy.safetensors", lambda tensors, card: tensors.write_bytes(b"\xff" * 64)),
-    "a pickle": ("policy.safetensors", lambda tensors, card: tensors.write_bytes(pickle.dumps({"actor": 1}))),
-    "an archive of another learner": ("policy.safetensors", lambda tensors, card: tensors.write_bytes(b"PK\x03\x04")),
-    "not a number": ("policy.safetensors", tensors_changed(log_deviation=NAN)),
-    "infinite": ("policy.safetensors", tensors_changed(actor__1__bias=np.array([np.inf, 0], np.float32))),
-    "no deviation": ("policy.safetensors", tensors_changed(log_deviation=None)),
-    "three deviations": ("policy.safetensors", tensors_changed(log_deviation=ZEROS(3, np.float32))),
-    "no bias": ("policy.safetensors", tensors_changed(actor__1__bias=None)),
-    "a layer left out": ("policy.safetensors", tensors_changed(actor__1__weight=None)),
-    "no critic": ("policy.safetensors", tensors_changed(critic__0__weight=None, critic__1__weight=None)),
-    "other observations": ("policy.safetensors", tensors_changed(actor__0__weight=ZEROS((5, SIZE - 1), np.float32))),
-    "layers that do not fit": ("policy.safetensors", tensors_changed(actor__1__weight=ZEROS((2, 6), np.float32))),
-    "three actions": (
-        "policy.safetensors",
-        tensors_changed(actor__1__weight=ZEROS((3, 5), np.float32), actor__1__bias=ZEROS(3, np.float32)),
-    ),
-    "a vector for a matrix": ("policy.safetensors", tensors_changed(actor__1__weight=ZEROS(5, np.float32))),
-    "whole numbers": ("policy.safetensors", tensors_changed(actor__1__weight=ZEROS((2, 5), np.int32))),
-    "no JSON": ("policy.json", lambda tensors, card: card.write_text("{")),
-    "no UTF-8": ("policy.json", lambda tensors, card: card.write_bytes(b"\xff\xfe")),
-    "a list": ("policy.json", lambda tensors, card: card.write_text("[]")),
-    "deeply nested": ("policy.json", lambda tensors, card: card.write_text("[" * 100_000)),
-    "a later format": ("policy.json", card_changed(format=2)),
-    "another layout": ("policy.json", card_changed(observation=["speed_mps"])),
-    "no layout": ("policy.json", lambda tensors, card: card.write_text('{"format": 1}')),
-}
-
-
-@pytest.mark.parametrize("name", DAMAGE)
-def test_read_policy__a_damaged_file_is_refused_by_name(name: str, tmp_path: Path) -> None:
-    write_policy(some_policy(), tmp_path)
-    damaged, damage = DAMAGE[name]
-    damage(tmp_path / "policy.safetensors", tmp_path / "policy.json")
-    with pytest.raises(UsageError) as error:
+def test_read_policy__a_misspelt_parameter_is_named_with_the_nearest(tmp_path: Path) -> None:
+    """Further damage is in `tests/hostile/bad_documents.py`."""
+    tensors = dict(some_policy().tensors)
+    tensors["actor.1.wieght"] = tensors.pop("actor.1.weight")
+    write_policy(Policy(tensors), tmp_path)
+    with pytest.raises(UsageError, match=r"'actor\.1\.wieght': did you mean 'actor\.1\.weight'"):
         read_policy(tmp_path)
-    (problem,) = error.value.problems
-    assert problem.file == str(tmp_path / damaged)
-    assert problem.message
-    assert problem.remedy
 
 
 def test_read_policy__a_file_that_is_too_large_is_refused_unread(tmp_path: Path) -> None:

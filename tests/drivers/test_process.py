@@ -14,9 +14,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.assessment.rollout import SeatedArm, assess
-from harness.config.persona import Persona
-from harness.config.toml_reading import read_document
 from harness.drivers.car import Car, car_of
 from harness.drivers.process import ProcessDriver
 from harness.errors import DriverError
@@ -25,8 +22,8 @@ from harness.game.roles import EGO
 from harness.road.scene.open_scene import OpenScene
 from tests.support.processes import driver, is_running, started
 from tests.support.repository import REPOSITORY
-from tests.support.rollouts import seated
-from tests.support.tiny import CAREFUL, wait_for
+from tests.support.rollouts import arm, play
+from tests.support.tiny import wait_for
 
 GAMES = np.array([3, 7])
 SEEN = np.linspace(-1.0, 1.0, 2 * SIZE, dtype=np.float32).reshape(2, SIZE)
@@ -75,38 +72,29 @@ def test_process__scaled_units_are_those_of_policies(tmp_path: Path, car: Car) -
     )
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (
-            'if number == 2: sys.exit("out of petrol")',
-            "ended with exit code 1 (message: decide); on its standard error: out of petrol",
-        ),
-        ("if number == 2: os.kill(os.getpid(), 11)", "was killed by SIGSEGV"),
-        ("if number == 0: sys.exit(0)", "ended with exit code 0 (message: hello)"),
-        ("if number == 2: sys.stdout.close(); os.close(1); time.sleep(60)", "closed its standard output"),
-        ("if number == 2: print('{', flush=True); continue", "not JSON"),
-        ("if number == 2: answer = [1]", "answered decide with [1], not with an object"),
-        ("if number == 2: answer = {}", "2 pairs of numbers are needed, not None"),
-        ("if number == 2: answer['actions'] = [[0, 0]]", "2 pairs of numbers are needed"),
-        ("if number == 2: answer['actions'][1] = [0, 0, 0]", "each must be a pair of numbers, not [0, 0, 0]"),
-        ("if number == 2: answer['actions'][1] = ['0', 0]", "each must be a pair of numbers"),
-        ("if number == 2: answer['actions'][1] = [float('nan'), 0]", "is not finite"),
-        ("if number == 2: answer['actions'][1] = [10**400, 0]", "too large"),
-        (
-            "if number == 2: answer['actions'][1] = [1e9, 0]",
-            "decided an acceleration of 1e+09 m/s², which is beyond ±100",
-        ),
-        (
-            "if number == 2: answer['actions'][1] = [0, -9.0]",
-            "a road wheel angle of 9 rad, which is beyond ±6.283",
-        ),
-        ("if number == 2: answer = {'error': 'no such lane'}", "reports an error: 'no such lane'"),
-        ("if number == 0: answer = {'protocol': 1}", "does not support protocol 2"),
-        ("if number == 1: print('{}', flush=True)", "answered"),
-        ("if number == 2: os.write(1, b'[' * 11_000_000)", "answers with more than 10,000,000 bytes"),
-    ],
-)
+INVALID = [
+    ("if number == 2: sys.exit('no petrol')", "exit code 1 (message: decide); on its standard error: no petrol"),
+    ("if number == 2: os.kill(os.getpid(), 11)", "was killed by SIGSEGV"),
+    ("if number == 0: sys.exit(0)", "ended with exit code 0 (message: hello)"),
+    ("if number == 2: sys.stdout.close(); os.close(1); time.sleep(60)", "closed its standard output"),
+    ("if number == 2: print('{', flush=True); continue", "not JSON"),
+    ("if number == 2: answer = [1]", "answered decide with [1], not with an object"),
+    ("if number == 2: answer = {}", "2 pairs of numbers are needed, not None"),
+    ("if number == 2: answer['actions'] = [[0, 0]]", "2 pairs of numbers are needed"),
+    ("if number == 2: answer['actions'][1] = [0, 0, 0]", "each must be a pair of numbers, not [0, 0, 0]"),
+    ("if number == 2: answer['actions'][1] = ['0', 0]", "each must be a pair of numbers"),
+    ("if number == 2: answer['actions'][1] = [float('nan'), 0]", "is not finite"),
+    ("if number == 2: answer['actions'][1] = [10**400, 0]", "too large"),
+    ("if number == 2: answer['actions'][1] = [1e9, 0]", "an acceleration of 1e+09 m/s², which is beyond ±100"),
+    ("if number == 2: answer['actions'][1] = [0, -9.0]", "a road wheel angle of 9 rad, which is beyond ±6.283"),
+    ("if number == 2: answer = {'error': 'no such lane'}", "reports an error: 'no such lane'"),
+    ("if number == 0: answer = {'protocol': 1}", "does not support protocol 2"),
+    ("if number == 1: print('{}', flush=True)", "answered"),
+    ("if number == 2: os.write(1, b'[' * 11_000_000)", "answers with more than 10,000,000 bytes"),
+]
+
+
+@pytest.mark.parametrize(("change", "message"), INVALID)
 def test_process__an_invalid_answer_is_an_error(change: str, message: str, tmp_path: Path, car: Car) -> None:
     assert message in refusal(driver(tmp_path, car, change))
 
@@ -184,9 +172,7 @@ def test_process__a_crash_costs_one_game(tmp_path: Path, merge: OpenScene, car: 
         "globals().__setitem__('steps', 0 if message['type'] == 'reset' else globals().get('steps', 0) + 1);"
         "n == 2 and message['type'] == 'decide' and steps == 4 and sys.exit('flat tyre')"
     )
-    mine, careful = driver(tmp_path, car, counts), read_document(CAREFUL, Persona)
-    arm = SeatedArm(name="naive_alone", scene=merge, drivers=seated((mine, None), (careful, careful)), seed=1)
-    games = [game.record for game in assess(arm, 4)]
+    games = [game.record for game in play(arm(merge, driver(tmp_path, car, counts), None), 4)]
     assert [game["ego_outcome"] == "error" for game in games] == [False, True, False, False]
     assert "DriverError" in games[1]["error"]
     assert "flat tyre" in games[1]["error"]
@@ -194,12 +180,7 @@ def test_process__a_crash_costs_one_game(tmp_path: Path, merge: OpenScene, car: 
 
 
 def test_process__the_example_in_perl_reaches_its_goal(merge: OpenScene, car: Car) -> None:
-    folder, careful = REPOSITORY / "egos" / "examples" / "process", read_document(CAREFUL, Persona)
+    folder = REPOSITORY / "egos" / "examples" / "process"
     mine = ProcessDriver(["perl", "drive.pl"], folder, car, units="si", deadline_s=5.0, start_deadline_s=20.0)
-    games = [
-        game.record
-        for game in assess(
-            SeatedArm(name="naive_alone", scene=merge, drivers=seated((mine, None), (careful, careful)), seed=1), 4
-        )
-    ]
-    assert [(game["error"], game["ego_outcome"]) for game in games] == [("", "goal")] * 4
+    games = play(arm(merge, mine, None), 4)
+    assert [(game.record["error"], game.record["ego_outcome"]) for game in games] == [("", "goal")] * 4

@@ -12,11 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from harness.assessment.rollout import SeatedArm, assess
 from harness.config.driver import read_driver
-from harness.config.persona import Persona
 from harness.config.rule_driver import REACTIONS, Cruise, LaneKeeping, Rules
-from harness.config.toml_reading import read_document
 from harness.drivers.adaptive_cruise import cruise_mps2, in_path, target_speed_mps, time_gap_law_mps2
 from harness.drivers.car import Car, car_of
 from harness.drivers.perception import Encounters, OwnMotion, perceive
@@ -30,8 +27,8 @@ from harness.game.road import AHEAD_M
 from harness.game.roles import EGO
 from harness.game.state import State
 from harness.road.scene.open_scene import OpenScene, open_scene
+from tests.support import rollouts
 from tests.support.observations import observation_of
-from tests.support.rollouts import seated
 from tests.support.scenes import build_scene
 
 EGOS = ("adas", "careful_and_competent", "fuzzy", "rss")
@@ -197,49 +194,22 @@ def test_cruise__is_comfortable(gap: float, own: float, other: float, before: fl
 
 
 def motion(
-    speed_mps: float,
-    limit_mps: float,
-    *,
-    turned: float = 0.0,
-    left: float = 0.0,
-    steering: float = 0.0,
-    road: float = 0.0,
+    speed_mps: float, limit_mps: float, *, turned: float = 0.0, left: float = 0.0, steering: float = 0.0
 ) -> OwnMotion:
-    """The motion of a car in one game, without a stop line ahead."""
-    return OwnMotion(
-        speed_mps=np.array([speed_mps]),
-        limit_mps=np.array([limit_mps]),
-        acceleration_mps2=np.zeros(1),
-        steering_rad=np.array([steering]),
-        road_steering_rad=np.array([road]),
-        path_left_m=np.array([left]),
-        path_turned_rad=np.full((1, len(AHEAD_M)), turned),
-        path_bend_per_m=np.zeros((1, len(AHEAD_M))),
-        stop_line_m=np.array([np.inf]),
-        stop_sign=np.array([False]),
-        signal_red=np.array([False]),
-        signal_yellow=np.array([False]),
-    )
+    """The motion of a car in one game, on a straight road without a stop line ahead."""
+    numbers = (speed_mps, limit_mps, 0.0, steering, 0.0, left)
+    path = (np.full((1, len(AHEAD_M)), turned), np.zeros((1, len(AHEAD_M))))
+    line = (np.array([np.inf]), *[np.array([False])] * 3)
+    return OwnMotion(*(np.array([number]) for number in numbers), *path, *line)
 
 
 def _cruise(gap_m: float, own_mps: float, other_mps: float, before_mps2: float | None = None) -> float:
     """The request of the cruise control behind a car; without `before_mps2` the jerk has no limit."""
-    nothing = np.zeros((1, 1))
     columns = (gap_m + 4.6, gap_m, 0.0, -1.8, other_mps, 0.0, 4.6, np.inf, np.inf)
-    encounters = Encounters(
-        np.array([[True]]), *(nothing + column for column in columns), has_priority=np.array([[False]])
-    )
+    encounters = Encounters(*(np.array([[value]]) for value in (True, *columns, False)))
+    step_s, before = (1000.0, 0.0) if before_mps2 is None else (0.1, before_mps2)
     view = motion(own_mps, 13.89)
-    step_s = 1000.0 if before_mps2 is None else 0.1
-    return float(
-        cruise_mps2(
-            view,
-            encounters,
-            before_mps2=np.array([before_mps2 or 0.0]),
-            law=Cruise(),
-            step_s=step_s,
-        )[0]
-    )
+    return float(cruise_mps2(view, encounters, before_mps2=np.array([before]), law=Cruise(), step_s=step_s)[0])
 
 
 # --- keeping the lane ----------------------------------------------------------------------------------------------
@@ -335,10 +305,8 @@ def test_driver__keeps_a_state_per_game(car: Car) -> None:
 def play(repository: Path, scene: OpenScene, *, ego: str, other: Driver | None, games: int) -> list[dict[str, Any]]:
     document = read_driver(repository / "egos" / f"{ego}.toml")
     assert isinstance(document, Rules)
-    careful = read_document(repository / "personas" / "careful.toml", Persona)
     driver = RulesDriver(document, car_of(scene.world, EGO))
-    arm = SeatedArm(name="arm", scene=scene, drivers=seated((driver, other), (careful, careful)), seed=1)
-    return [game.record for game in assess(arm, games)]
+    return [game.record for game in rollouts.play(rollouts.arm(scene, driver, other), games)]
 
 
 @pytest.mark.parametrize("other", [None, SumoDriver()], ids=["alone", "beside SUMO's driver"])
@@ -354,12 +322,10 @@ def test_games__every_ego_reaches_its_goal_in_comfort(
 
 
 BENDS = "".join(f'<node id="{n}" x="{x}" y="{y}"/>' for n, x, y in (("a", 0, 0), ("b", 120, 0), ("c", 250, 90)))
+CURVE = ' shape="120,0 135,1 150,4 165,9 180,17 193,28 205,40 220,56 250,90"'
 BENT = "".join(
     f'<edge id="{name}" from="{name[0]}" to="{name[1]}" numLanes="2" speed="16.67" spreadType="right"{shape}/>'
-    for name, shape in (
-        ("ab", ""),
-        ("bc", ' shape="120,0 135,1 150,4 165,9 180,17 193,28 205,40 220,56 250,90"'),
-    )
+    for name, shape in (("ab", ""), ("bc", CURVE))
 )
 
 

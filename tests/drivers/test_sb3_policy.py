@@ -18,18 +18,14 @@ import torch
 from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
 import harness
-from harness.assessment.rollout import SeatedArm, assess
 from harness.config.driver import StableBaselines3
-from harness.config.persona import Persona
-from harness.config.toml_reading import read_document
 from harness.drivers.external import find_driver
 from harness.drivers.sb3_policy import Sb3Driver
 from harness.errors import UsageError
 from harness.game.observation_layout import SIZE
 from harness.road.scene.open_scene import OpenScene
 from tests.support.random_observations import Recorded
-from tests.support.rollouts import seated
-from tests.support.tiny import CAREFUL
+from tests.support.rollouts import arm, play
 
 torch.set_num_threads(1)  # tiny networks: more threads only wait for each other
 
@@ -112,11 +108,7 @@ def test_saved__a_deterministic_policy_can_not_be_sampled(name: str, saved: dict
 
 @pytest.mark.parametrize("name", ALGORITHMS)
 def test_saved__plays_games(name: str, saved: dict[str, Path], merge: OpenScene) -> None:
-    careful = read_document(CAREFUL, Persona)
-    driver = Sb3Driver(document(name), saved[name], sampled=False)
-    (game,) = assess(
-        SeatedArm(name="naive_alone", scene=merge, drivers=seated((driver, None), (careful, careful)), seed=1), 1
-    )
+    (game,) = play(arm(merge, Sb3Driver(document(name), saved[name], sampled=False), None), 1)
     assert game.record["error"] == ""
 
 

@@ -9,17 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.assessment.rollout import Game, SeatedArm, assess
-from harness.config.persona import Persona
-from harness.config.toml_reading import read_document
+from harness.assessment.rollout import Game
 from harness.drivers.policy import LearnedDriver
-from harness.drivers.protocol import Driver
 from harness.drivers.sumo import SumoDriver
 from harness.errors import UsageError
-from harness.road.scene.open_scene import OpenScene, open_scene
+from harness.road.scene.open_scene import open_scene
 from tests.support.policies import some_policy
-from tests.support.rollouts import seated
-from tests.support.tiny import CAREFUL, MERGE
+from tests.support.rollouts import arm, play, trace
+from tests.support.tiny import MERGE
 
 FOLLOWING = ("Krauss", "IDM", "EIDM", "ACC", "CACC")
 CHANGING = ("LC2013", "SL2015")
@@ -42,24 +39,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def play(scene: OpenScene, non_ego: Driver | None, episodes: int) -> list[Game]:
-    careful = read_document(CAREFUL, Persona)
-    return list(
-        assess(
-            SeatedArm(
-                name="naive_alone", scene=scene, drivers=seated((SumoDriver(), non_ego), (careful, careful)), seed=1
-            ),
-            episodes,
-        )
-    )
-
-
 def across_m(game: Game) -> float:
     """Lateral distance that the ego moved."""
-    assert game.trace is not None
-    return float(
-        np.ptp([y for y, player in zip(game.trace["y_m"], game.trace["player"], strict=True) if player == "ego"])
-    )
+    frame = trace(game)
+    return float(np.ptp(frame.loc[frame["player"] == "ego", "y_m"]))
 
 
 @pytest.mark.parametrize("changing", CHANGING)
@@ -68,25 +51,24 @@ def test_sumo_types__each_model_leaves_the_lane_that_ends_and_reaches_the_goal(
     following: str, changing: str, folder: Path
 ) -> None:
     scene = open_scene(folder, f"{following}_{changing}")
-    for game in play(scene, SumoDriver(), 2):
+    for game in play(arm(scene, SumoDriver(), SumoDriver()), 2):
         assert (game.record["error"], game.record["ego_outcome"]) == ("", "goal")
         assert across_m(game) == pytest.approx(3.2, abs=0.2)
-        assert game.trace is not None
-        assert f"{following}_{changing}" in game.trace["vehicle_type"]
+        assert f"{following}_{changing}" in set(trace(game)["vehicle_type"])
 
 
 def test_sumo_types__car_following_models_differ(folder: Path) -> None:
     """CACC differs from ACC only behind a car."""
     paths = {}
     for following in FOLLOWING:
-        games = play(open_scene(folder, f"{following}_LC2013"), SumoDriver(), 4)
+        games = play(arm(open_scene(folder, f"{following}_LC2013"), SumoDriver(), SumoDriver()), 4)
         paths[following] = tuple(game.record["ego_mean_speed_mps"] for game in games)
     assert len(set(paths.values())) == len(FOLLOWING)
 
 
 def test_sumo_types__sublanes_allow_a_player_that_leaves_the_road(folder: Path) -> None:
     wild = LearnedDriver(some_policy(), sampled=True)
-    games = play(open_scene(folder, "EIDM_SL2015"), wild, 5)
+    games = play(arm(open_scene(folder, "EIDM_SL2015"), SumoDriver(), wild), 5)
     assert [game.record["error"] for game in games] == [""] * 5
     assert "rail" in [game.record["non_ego_outcome"] for game in games]
 

@@ -8,7 +8,6 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from types import BuiltinFunctionType
 from typing import Any
@@ -22,8 +21,7 @@ from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
-from harness.game.human_factors import HumanFactors
-from harness.game.initial_state import StartDistribution, draw_initial_state
+from harness.game.initial_state import draw_initial_state
 from harness.game.outcome import Outcome
 from harness.game.seeding import generator_of
 from harness.road.scene.open_scene import OpenScene, open_scene
@@ -37,9 +35,7 @@ PER_STEP = {"simulationStep": 1, "simulation.getArrivedIDList": 1}
 PER_STEP_WITH_TRAFFIC = {"simulation.getDepartedIDList": 1}
 PER_STEP_WITH_DIRECT_READS = {"simulation.getMinExpectedNumber": 1}
 READS_PER_VEHICLE = ("getPosition", "getAngle", "getSpeed")
-
 READS_PER_FAR_VEHICLE = 0.2  # a step
-
 FEW, MANY = 4, 16  # games
 VEHICLES = 6  # of background traffic, per game
 STEPS = 20
@@ -77,19 +73,15 @@ class Counting:
     """An arena of coasting players that do not reach their goals during the count."""
 
     def __init__(self, scene: OpenScene, games: int, sumo_drives: bool = False) -> None:
-        persona = read_document(PERSONA, Persona)
-        seats = [Seat(None, persona.payoff), Seat(SumoDriver() if sumo_drives else None, persona.payoff)]
+        payoff = read_document(PERSONA, Persona).payoff
+        seats = [Seat(None, payoff), Seat(SumoDriver() if sumo_drives else None, payoff)]
         self.arena = Arena(scene, games, seats, seed=1)
-        self._start_distribution: StartDistribution = scene.start_distribution(
-            [HumanFactors()] * 2, [1.0, 1.0]
-        )  # without lapses of attention no player leaves the road
         self._coast = np.zeros((games, 2, 2))
 
     def reset(self, *games: int) -> None:
-        departures = {game: self.arena.scene.departures(generator_of(1)) for game in games}
-        self.arena.reset(
-            {game: draw_initial_state(self._start_distribution, "cost", game) for game in games}, departures
-        )
+        scene = self.arena.scene  # without lapses of attention no player leaves the road
+        starts = {game: draw_initial_state(scene.usual_starts, "cost", game) for game in games}
+        self.arena.reset(starts, {game: scene.departures(generator_of(1)) for game in games})
 
     def steps(self, count: int = STEPS) -> None:
         for _ in range(count):
@@ -115,22 +107,6 @@ def counting(scene: OpenScene, games: int, sumo_drives: bool = False) -> Iterato
         counted.arena.close()
 
 
-@dataclass(frozen=True)
-class Scenes:
-    """A straight road: without background traffic, with traffic beside the players, and with traffic far ahead."""
-
-    empty: OpenScene
-    busy: OpenScene
-    far: OpenScene
-
-    @classmethod
-    def built(cls, folder: Path) -> Scenes:
-        empty = build_scene(folder / "empty")
-        return cls(
-            empty, with_traffic(vans(NEAR_M), empty, folder / "busy"), with_traffic(vans(FAR_M), empty, folder / "far")
-        )
-
-
 def with_traffic(vehicles: str, empty: OpenScene, folder: Path) -> OpenScene:
     """A scene with background traffic on the same network, so that the tiles are made once."""
     shutil.copytree(empty.folder, folder)
@@ -146,24 +122,28 @@ def vans(first_m: float) -> str:
 
 
 @pytest.fixture(scope="module")
-def scenes(tmp_path_factory: pytest.TempPathFactory) -> Scenes:
-    return Scenes.built(tmp_path_factory.mktemp("scenes"))
+def scenes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, OpenScene]:
+    """A straight road: without background traffic, with traffic beside the players, and with traffic far ahead."""
+    folder = tmp_path_factory.mktemp("scenes")
+    empty = build_scene(folder / "empty")
+    busy, far = (with_traffic(vans(each), empty, folder / f"{each:g}") for each in (NEAR_M, FAR_M))
+    return {"empty": empty, "busy": busy, "far": far}
 
 
 # --- calls into SUMO --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("games", [1, FEW, MANY])
-def test_step__calls_sumo_for_placements_and_a_step_only(games: int, scenes: Scenes) -> None:
-    with counting(scenes.empty, games) as counted:
+def test_step__calls_sumo_for_placements_and_a_step_only(games: int, scenes: dict[str, OpenScene]) -> None:
+    with counting(scenes["empty"], games) as counted:
         calls = counted.libsumo_calls(counted.steps)
     expected = {name: number * STEPS for name, number in PER_STEP.items()}
     assert calls == expected | {"vehicle.moveToXY": PLACEMENTS_PER_GAME * games * STEPS}
 
 
 @pytest.mark.skipif(not DIRECT, reason="vehicles can't be read directly on this platform")
-def test_step__calls_no_function_per_vehicle_if_vehicles_are_read_directly(scenes: Scenes) -> None:
-    with counting(scenes.busy, FEW) as counted:
+def test_step__calls_no_function_per_vehicle_if_vehicles_are_read_directly(scenes: dict[str, OpenScene]) -> None:
+    with counting(scenes["busy"], FEW) as counted:
         calls = counted.libsumo_calls(counted.steps)
     of_steps = PER_STEP | PER_STEP_WITH_TRAFFIC | PER_STEP_WITH_DIRECT_READS
     expected = {name: number * STEPS for name, number in of_steps.items()}
@@ -177,8 +157,8 @@ def through_python(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("through_python")
-def test_step__reads_each_vehicle_near_a_player_once(scenes: Scenes) -> None:
-    with counting(scenes.busy, FEW) as counted:
+def test_step__reads_each_vehicle_near_a_player_once(scenes: dict[str, OpenScene]) -> None:
+    with counting(scenes["busy"], FEW) as counted:
         calls = counted.libsumo_calls(counted.steps)
     expected = {name: number * STEPS for name, number in (PER_STEP | PER_STEP_WITH_TRAFFIC).items()}
     expected |= {f"vehicle.{name}": VEHICLES * FEW * STEPS for name in READS_PER_VEHICLE}
@@ -186,22 +166,22 @@ def test_step__reads_each_vehicle_near_a_player_once(scenes: Scenes) -> None:
 
 
 @pytest.mark.usefixtures("through_python")
-def test_step__seldom_reads_vehicles_far_away(scenes: Scenes) -> None:
-    with counting(scenes.far, FEW) as counted:
+def test_step__seldom_reads_vehicles_far_away(scenes: dict[str, OpenScene]) -> None:
+    with counting(scenes["far"], FEW) as counted:
         calls = counted.libsumo_calls(counted.steps)
     reads = sum(calls[f"vehicle.{name}"] for name in READS_PER_VEHICLE)
     assert 0 < reads <= READS_PER_FAR_VEHICLE * VEHICLES * FEW * STEPS
 
 
-def test_step__a_player_driven_by_sumo_is_read_and_not_placed(scenes: Scenes) -> None:
-    with counting(scenes.empty, FEW, sumo_drives=True) as counted:
+def test_step__a_player_driven_by_sumo_is_read_and_not_placed(scenes: dict[str, OpenScene]) -> None:
+    with counting(scenes["empty"], FEW, sumo_drives=True) as counted:
         calls = counted.libsumo_calls(counted.steps)
     assert calls["vehicle.moveToXY"] == FEW * STEPS
     assert calls.total() == STEPS * (sum(PER_STEP.values()) + FEW * (1 + len(READS_PER_VEHICLE)))
 
 
-def test_step__a_finished_game_has_no_placements(scenes: Scenes) -> None:
-    with counting(scenes.busy, FEW) as counted:
+def test_step__a_finished_game_has_no_placements(scenes: dict[str, OpenScene]) -> None:
+    with counting(scenes["busy"], FEW) as counted:
         counted.arena.state.outcome[0] = Outcome.GOAL
         for player in range(2):
             counted.arena.simulation.remove(0, player)
@@ -209,13 +189,13 @@ def test_step__a_finished_game_has_no_placements(scenes: Scenes) -> None:
     assert calls["vehicle.moveToXY"] == PLACEMENTS_PER_GAME * (FEW - 1) * STEPS
 
 
-def test_reset__without_background_traffic_players_stay_in_sumo(scenes: Scenes) -> None:
-    with counting(scenes.empty, FEW) as counted:
+def test_reset__without_background_traffic_players_stay_in_sumo(scenes: dict[str, OpenScene]) -> None:
+    with counting(scenes["empty"], FEW) as counted:
         assert counted.libsumo_calls(lambda: counted.reset(0)).total() == 0
 
 
-def test_step__releases_the_memory_that_it_takes(scenes: Scenes) -> None:
-    with counting(scenes.empty, FEW) as counted:
+def test_step__releases_the_memory_that_it_takes(scenes: dict[str, OpenScene]) -> None:
+    with counting(scenes["empty"], FEW) as counted:
         counted.steps(500)  # until caches are filled
         gc.collect()
         before = sys.getallocatedblocks()
