@@ -139,8 +139,3 @@ def test_collision_of__knows_the_opponent_of_a_recorded_game(merge: OpenScene) -
         if collision is not None:
             assert collision.course.opponent == 1
             assert collision.course.failed_step * merge.world.step_s <= game.record["duration_s"] + 1e-9
-
-
-def test_collision_of__a_course_goes_on_along_the_road(straight: OpenScene) -> None:
-    course = cut_in(straight, gap_m=12.0, own_kmh=60, other_kmh=20, approach_mps=1.2)
-    assert course.players[-1, 1, 0] > course.players[course.failed_step, 1, 0]

@@ -31,6 +31,7 @@ class Failing(Steady):
     """Raises in the third step of every second game."""
 
     def __init__(self, error: Exception) -> None:
+        super().__init__()
         self.error, self.games, self.steps = error, 0, 0
 
     def reset(self, games: IntArray) -> None:
@@ -43,16 +44,11 @@ class Failing(Steady):
         return np.zeros((len(games), 2))
 
 
-def test_assess__twice_is_the_same(merge: OpenScene) -> None:
-    first, second = (play(arm(merge, RANDOM, SumoDriver())) for _ in range(2))
-    assert records(first) == records(second)
-    for one, other in zip(first, second, strict=True):
+def test_assess__twice_is_the_same_whatever_the_number_of_games(merge: OpenScene) -> None:
+    first, second = (play(arm(merge, RANDOM, SumoDriver()), games) for games in (3, 2))
+    assert records(first[:2]) == records(second)
+    for one, other in zip(first, second, strict=False):
         pd.testing.assert_frame_equal(trace(one), trace(other), check_exact=True)
-
-
-def test_assess__a_game_does_not_depend_on_the_number_of_games(merge: OpenScene) -> None:
-    many, one = play(arm(merge, Steady(), SumoDriver()), 3), play(arm(merge, Steady(), SumoDriver()), 1)
-    assert records(many[:1]) == records(one)
 
 
 def test_assess__episodes_and_seeds_give_different_games(merge: OpenScene) -> None:
@@ -62,23 +58,12 @@ def test_assess__episodes_and_seeds_give_different_games(merge: OpenScene) -> No
 
 
 def test_assess__an_episode_has_the_same_start_in_every_arm(merge: OpenScene) -> None:
-    arms = [
-        arm(merge, Steady(), None),
-        arm(merge, RANDOM, SumoDriver()),
-        arm(merge, SumoDriver(), RANDOM),
-        arm(merge, None, RANDOM),
-        arm(merge, RANDOM, RANDOM, persona=DISTRACTED),
-    ]
+    drivers = [(Steady(), None), (RANDOM, SumoDriver()), (SumoDriver(), RANDOM), (None, RANDOM)]
+    arms = [*(arm(merge, *each) for each in drivers), arm(merge, RANDOM, RANDOM, persona=DISTRACTED)]
     starts = []
     for each in arms:
-        frames = [trace(game) for game in play(each)]
-        starts.append(
-            {
-                (row.episode, row.player): tuple(getattr(row, name) for name in POSE)
-                for frame in frames
-                for row in frame[frame["step"] == 0].itertuples()
-            }
-        )
+        first = pd.concat([trace(game).query("step == 0") for game in play(each)])
+        starts.append(first.set_index(["episode", "player"])[POSE].T.to_dict("list"))
     both_players = starts[1]
     assert set(both_players) == {(k, player) for k in range(3) for player in ("ego", "non_ego")}
     for each in starts:
@@ -87,11 +72,9 @@ def test_assess__an_episode_has_the_same_start_in_every_arm(merge: OpenScene) ->
 
 def test_assess__lapses_depend_on_the_episode_and_not_on_the_arm(merge: OpenScene) -> None:
     arms = [play(arm(merge, ego, Steady(), persona=DISTRACTED), 6) for ego in (Steady(), None)]
-    lapses = []
-    for games in arms:
-        frames = [trace(game) for game in games]
-        of_non_ego = [frame[frame["player"] == "non_ego"].set_index("step")["lapsed"] for frame in frames]
-        lapses.append(of_non_ego)
+    lapses = [
+        [trace(game).query("player == 'non_ego'").set_index("step")["lapsed"] for game in games] for games in arms
+    ]
     assert any(each.any() for each in lapses[0])
     for one, other in zip(*lapses, strict=True):
         both = one.index.intersection(other.index)[:20]  # before the players can influence each other
@@ -102,16 +85,13 @@ def test_assess__lapses_depend_on_the_episode_and_not_on_the_arm(merge: OpenScen
 
 
 def test_record__cells_of_an_absent_player_are_empty(merge: OpenScene) -> None:
-    (game, *_) = play(arm(merge, SumoDriver(), None), 1)
-    assert game.record["non_ego_outcome"] == ""
-    assert all(game.record[name] is None for name in MEASURED if name.startswith("non_ego_"))
-    assert game.record["ego_failed"] in (0, 1)
-    (game, *_) = play(arm(merge, None, SumoDriver()), 1)
-    assert game.record["ego_outcome"] == ""
-    assert game.record["ego_failed"] is None
-    assert all(game.record[name] is None for name in MEASURED if name.startswith("ego_"))
-    assert game.record["non_ego_outcome"] != ""
-    assert game.record["non_ego_mean_speed_mps"] > 0.0
+    for drivers, absent, there in (((SumoDriver(), None), "non_ego", "ego"), ((None, SumoDriver()), "ego", "non_ego")):
+        (game,) = play(arm(merge, *drivers), 1)
+        assert game.record[f"{absent}_outcome"] == ""
+        assert all(game.record[name] is None for name in MEASURED if name.startswith(f"{absent}_"))
+        assert game.record[f"{there}_outcome"] != ""
+        assert game.record[f"{there}_mean_speed_mps"] > 0.0
+        assert game.record["ego_failed"] in ((0, 1) if there == "ego" else (None,))
 
 
 def test_record__the_ego_failed_unless_it_reached_the_goal(merge: OpenScene) -> None:
@@ -148,10 +128,10 @@ def test_records__make_a_table_of_episodes(merge: OpenScene) -> None:
 
 # --- errors -----------------------------------------------------------------------------------------------------------
 
-ERRORS = [RuntimeError("out of ideas"), KeyError("goal"), TypeError("no"), ZeroDivisionError("x / 0"), OSError("gone")]
+ERRORS = [RuntimeError("out of ideas"), OSError("gone"), SimulationError("died")]
 
 
-@pytest.mark.parametrize("error", [*ERRORS, SimulationError("died")], ids=lambda error: type(error).__name__)
+@pytest.mark.parametrize("error", ERRORS, ids=lambda error: type(error).__name__)
 def test_assess__an_exception_of_a_driver_ends_only_its_game(error: Exception, merge: OpenScene) -> None:
     games = play(arm(merge, Failing(error), SumoDriver()), 4)
     without_errors = play(arm(merge, Steady(), SumoDriver()), 4)
@@ -173,16 +153,6 @@ def test_assess__an_interrupt_is_raised(merge: OpenScene) -> None:
     with pytest.raises(KeyboardInterrupt):
         play(arm(merge, Interrupted(), None))
     assert len(play(arm(merge, Steady(), None), 1)) == 1  # SUMO was closed
-
-
-def test_assess__actions_that_are_not_finite_are_an_error(merge: OpenScene) -> None:
-    class NotFinite(Steady):
-        def decide(self, games: IntArray, *_: Any) -> FloatArray:
-            return np.full((len(games), 2), np.nan)
-
-    (game,) = play(arm(merge, NotFinite(), None), 1)
-    assert game.record["ego_outcome"] == "error"
-    assert game.record["error"]
 
 
 # --- the log --------------------------------------------------------------------------------------------------------
@@ -236,7 +206,7 @@ def test_log__has_every_quantity_of_the_live_game(scene: str, monkeypatch: pytes
     (game,) = play(arm(open_scene(scene), Steady(), SumoDriver() if scene == "merge" else Steady()), 1)
     recorded = game.recorded
     assert recorded is not None
-    names = (
+    names = [
         "speed_mps",
         "leader_gap_m",
         "time_to_collision_s",
@@ -244,8 +214,13 @@ def test_log__has_every_quantity_of_the_live_game(scene: str, monkeypatch: pytes
         "goal_m",
         "front_m",
         "gap_s",
-    )
-    names += ("passed_red_s", "wrong_way", "advanced_m", "speed_over_permitted", "clearance_m", "lateral_offset_m")
+        "passed_red_s",
+        "wrong_way",
+        "advanced_m",
+        "speed_over_permitted",
+        "clearance_m",
+        "lateral_offset_m",
+    ]
     for t, now in enumerate(live, start=1):
         drove = now.drove[0]
         assert drove.tolist() == recorded.drove[t].tolist()

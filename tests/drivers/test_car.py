@@ -8,17 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.drivers.car import Car, car_of
+from harness.drivers.car import Car
 from harness.game.bicycle import requests
 from harness.game.observation import observe
 from harness.game.observation_layout import LAYOUT, SIZE
 from harness.game.roles import EGO
 from harness.road.scene.open_scene import OpenScene
-
-
-@pytest.fixture(scope="module")
-def car(merge: OpenScene) -> Car:
-    return car_of(merge.world, EGO)
 
 
 def observation_with(**entries: float) -> np.ndarray:

@@ -66,37 +66,25 @@ def test_proactive__is_the_published_formula() -> None:
     )
 
 
-def test_critical__is_the_published_formula() -> None:
-    # v = 20, other 10, a = 0: 7.5 + 100 / 8 = 20; 7.5 + 100 / 12 = 15.833333
+@pytest.mark.parametrize(
+    ("own_mps", "own_mps2", "gaps_m", "shares"),
+    [
+        # other 10, a = 0: 7.5 + 100 / 8 = 20; 7.5 + 100 / 12 = 15.833333
+        (20.0, 0.0, [20.01, 17.916667, 15.83], [0.0, 0.5, 1.0]),
+        # a = 2: v' - other = 11.5; 0.375 (10 + 11.5) = 8.0625; + 132.25 / 8 = 24.59375, + 132.25 / 12 = 19.083333
+        (20.0, 2.0, [24.6, 19.08], [0.0, 1.0]),
+        # closing 2, a = -3: v' - other = -0.25; 4 / 6 = 0.666667 m are needed
+        (12.0, -3.0, [0.66, 0.67], [1.0, 0.0]),
+        (9.0, 0.0, [0.1], [0.0]),
+    ],
+)
+def test_critical__is_the_published_formula(
+    own_mps: float, own_mps2: float, gaps_m: list[float], shares: list[float]
+) -> None:
+    own, pushed, other = (np.array(each) for each in (own_mps, own_mps2, 10.0))
     law = FuzzySafety()
-    gaps = np.array([20.01, 17.916667, 15.83])
-    found = emergency_braking.critical(
-        gaps, own_mps=np.array(20.0), own_mps2=np.array(0.0), other_mps=np.array(10.0), law=law
-    )
-    np.testing.assert_allclose(found, [0.0, 0.5, 1.0], atol=1e-6)
-    # a = 2: v' - other = 11.5; 0.375 (10 + 11.5) = 8.0625; + 132.25 / 8 = 24.59375, + 132.25 / 12 = 19.083333
-    found = emergency_braking.critical(
-        np.array([24.6, 19.08]), own_mps=np.array(20.0), own_mps2=np.array(2.0), other_mps=np.array(10.0), law=law
-    )
-    np.testing.assert_array_equal(found, [0.0, 1.0])
-
-
-def test_critical__is_0_if_the_present_braking_suffices() -> None:
-    # closing 2, a = -3: v' - other = -0.25; 4 / 6 = 0.666667 m are needed
-    found = emergency_braking.critical(
-        np.array([0.66, 0.67]),
-        own_mps=np.array(12.0),
-        own_mps2=np.array(-3.0),
-        other_mps=np.array(10.0),
-        law=FuzzySafety(),
-    )
-    np.testing.assert_array_equal(found, [1.0, 0.0])
-    assert (
-        emergency_braking.critical(
-            np.array(0.1), own_mps=np.array(9.0), own_mps2=np.array(0.0), other_mps=np.array(10.0), law=FuzzySafety()
-        )
-        == 0.0
-    )
+    found = emergency_braking.critical(np.array(gaps_m), own_mps=own, own_mps2=pushed, other_mps=other, law=law)
+    np.testing.assert_allclose(found, shares, atol=1e-6)
 
 
 def test_fuzzy__braking_is_graded() -> None:
@@ -177,19 +165,15 @@ def test_react__waits_for_the_reaction_time_and_builds_up() -> None:
 
 def test_react__needs_the_reaction_time_again_after_a_calm_second() -> None:
     parameters, state = BrakeReaction(reaction_s=0.2, jerk_mps3=10.0), ReactionState(*np.zeros((3, 2)))
-    for danger in [True] * 4 + [False] * 9:
-        state, _, braking = react(
-            state, danger=np.array([danger, danger]), demand_mps2=np.full(2, 8.0), parameters=parameters, step_s=STEP_S
+    seen = []
+    for danger in [[True, True]] * 4 + [[False, False]] * 9 + [[True, False], [True, True]]:
+        state, reacting, braking = react(
+            state, danger=np.array(danger), demand_mps2=np.full(2, 8.0), parameters=parameters, step_s=STEP_S
         )
-    assert braking.tolist() == [0.0, 0.0]
-    state, reacting, _ = react(
-        state, danger=np.array([True, False]), demand_mps2=np.full(2, 8.0), parameters=parameters, step_s=STEP_S
-    )
-    assert not reacting[0], "the reaction time is over"
-    _, reacting, _ = react(
-        state, danger=np.array([True, True]), demand_mps2=np.full(2, 8.0), parameters=parameters, step_s=STEP_S
-    )
-    assert reacting.tolist() == [False, True]
+        seen.append((reacting.tolist(), braking.tolist()))
+    assert seen[12][1] == [0.0, 0.0]
+    assert not seen[13][0][0], "the reaction time is over"
+    assert seen[14][0] == [False, True]
 
 
 # --- properties ----------------------------------------------------------------------------------------------------

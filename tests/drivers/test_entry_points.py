@@ -11,12 +11,10 @@ import numpy as np
 import pytest
 
 from harness.cli import messages
-from harness.drivers.car import Car, car_of
+from harness.drivers.car import Car
 from harness.drivers.external import ExternalDriver, find_driver
 from harness.errors import UsageError
 from harness.game.observation_layout import SIZE
-from harness.game.roles import EGO
-from harness.road.scene.open_scene import OpenScene
 from tests.support.external_drivers import EXAMPLE, install
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import harness, write_campaign
@@ -29,11 +27,6 @@ def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.syspath_prepend(tmp_path / "site")
     monkeypatch.delitem(sys.modules, "steady", raising=False)
     return tmp_path / "site"
-
-
-@pytest.fixture(scope="module")
-def car(merge: OpenScene) -> Car:
-    return car_of(merge.world, EGO)
 
 
 def find(written: str, folder: Path) -> ExternalDriver:

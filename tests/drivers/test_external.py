@@ -170,12 +170,6 @@ def test_open_campaign__makes_a_test_decision_before_anything_runs(tmp_path: Pat
     assert "no road today" in message
 
 
-def test_open_campaign__an_unknown_vehicle_type_is_an_error(tmp_path: Path) -> None:
-    driver = document(tmp_path, 'kind = "sumo"\nvehicle_type = "ego_cra"')
-    (message,) = problems(write_campaign(tmp_path, ego=ego(driver)))
-    assert "merge.rou.xml: vType: has no vehicle type 'ego_cra' for the ego (did you mean 'ego_car'?)" in message
-
-
 def keys(folder: Path, driver: object) -> dict[str, str]:
     opened = open_campaign(write_campaign(folder, ego=ego(driver)), allow_code=True)
     stages = plan(opened.document, [each.name for each in opened.personas], opened.tunable)
@@ -188,14 +182,6 @@ def test_keys__depend_on_the_driver(tmp_path: Path) -> None:
     assert first == again
     (tmp_path / "adas.toml").write_text(ADAS.read_text().replace("time_gap_s = 1.5", "time_gap_s = 1.6"))
     assert not set(first.values()) & set(keys(tmp_path, "adas.toml").values())
-
-
-def test_keys__of_a_policy_are_the_hash_of_its_parameters(tmp_path: Path) -> None:
-    import hashlib
-
-    write_policy(some_policy(), tmp_path / "mine")
-    found = find("mine", tmp_path)
-    assert found.identity == hashlib.sha256((tmp_path / "mine" / "policy.safetensors").read_bytes()).hexdigest()
 
 
 @pytest.mark.parametrize(

@@ -12,11 +12,10 @@ import pytest
 from pythonfmu import FmuBuilder
 
 from harness.config.driver import Fmu
-from harness.drivers.car import Car, car_of
+from harness.drivers.car import Car
 from harness.drivers.fmu import fmu_driver, unconnected_inputs, wiring
 from harness.errors import DriverError, UsageError
 from harness.game.observation_layout import LAYOUT, SIZE
-from harness.game.roles import EGO
 from harness.road.scene.open_scene import OpenScene
 from tests.support.external_drivers import fmu_example
 from tests.support.rollouts import arm, play
@@ -29,11 +28,6 @@ def twins(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
     """The example, built for both versions of the standard."""
     folder = tmp_path_factory.mktemp("twins")
     return {fmi: fmu_example().build(folder / f"twin{fmi}.fmu", fmi) for fmi in (2, 3)}
-
-
-@pytest.fixture(scope="module")
-def car(merge: OpenScene) -> Car:
-    return car_of(merge.world, EGO)
 
 
 def document(**keys: Any) -> Fmu:

@@ -17,12 +17,11 @@ import numpy as np
 import pytest
 
 from harness.config.driver import Fmu
-from harness.drivers.car import Car, car_of
+from harness.drivers.car import Car
 from harness.drivers.fmu import fmu_driver, unconnected_inputs, wiring
 from harness.drivers.fmu_variables import INTEGERS
 from harness.errors import UsageError
 from harness.game.observation_layout import LAYOUT, SIZE
-from harness.game.roles import EGO
 from harness.road.scene.open_scene import OpenScene
 from tests.support.external_drivers import fmu_example
 from tests.support.rollouts import arm, play
@@ -50,11 +49,6 @@ SETTERS = """
 TYPED(Float32, ) TYPED(Int8, ) TYPED(UInt8, ) TYPED(Int16, ) TYPED(UInt16, ) TYPED(Int32, ) TYPED(UInt32, )
 TYPED(Int64, ) TYPED(UInt64, ) TYPED(Boolean, ) TYPED(String, strlen) PAIR(Binary)
 """
-
-
-@pytest.fixture(scope="module")
-def car(merge: OpenScene) -> Car:
-    return car_of(merge.world, EGO)
 
 
 @pytest.fixture(scope="module")

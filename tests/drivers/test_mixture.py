@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from harness.assessment.rollout import Game, SeatedArm, assess
+from harness.assessment.rollout import SeatedArm, assess
 from harness.campaign.results.population_summary import by_who_drove
 from harness.config.campaign import Campaign, Population
 from harness.config.persona import Persona
@@ -21,18 +22,17 @@ from harness.evaluation.tables import typed
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.human_factors import Attention, HumanFactors
 from harness.game.initial_state import InitialState, draw_initial_state
-from harness.road.scene.open_scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene
+from tests.support.rollouts import Steady
 
 TEXTING = HumanFactors(attention=Attention(mean_attentive_s=2.0, lapse_s=(1.0, 2.0), crown_steering_rad=0.02))
 
 
-class Steady:
-    """Always decides the same, and records the games of its resets and decisions."""
-
-    takes_over = True
+class Recording(Steady):
+    """Records the games of its resets and decisions."""
 
     def __init__(self, pedals: float) -> None:
-        self.pedals = pedals
+        super().__init__(pedals)
         self.reset_games: list[int] = []
         self.decided_games: set[int] = set()
 
@@ -41,12 +41,7 @@ class Steady:
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
         self.decided_games |= set(games.tolist())
-        return np.tile([self.pedals, 0.0], (len(games), 1))
-
-
-@pytest.fixture(scope="module")
-def merge(repository: Any) -> OpenScene:
-    return open_scene(repository / "tests/data/merge")
+        return super().decide(games, observation, noise)
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +80,7 @@ def test_mixture__initial_states_are_those_of_one_driver(merge: OpenScene) -> No
 
 
 def test_arena__calls_the_member_of_each_game(merge: OpenScene, people: dict[str, Persona]) -> None:
-    slow, fast = Steady(-0.2), Steady(0.5)
+    slow, fast = Recording(-0.2), Recording(0.5)
     arena = Arena(merge, 8, [Seat(Steady(0.0)), [Seat(slow), Seat(fast)]])
     try:
         starts = dict(enumerate(mixed_starts(merge, [1.0, 1.0], 8)))
@@ -106,47 +101,26 @@ def test_arena__calls_the_member_of_each_game(merge: OpenScene, people: dict[str
         assert driver.decided_games == games_of_member
 
 
-def records(games: list[Game]) -> list[dict[str, Any]]:
-    return [game.record for game in games]
+def drawn_members(merge: OpenScene, people: Sequence[Persona], seed: int, games: int) -> list[int]:
+    """Which of two people drives in each episode."""
+    factors = [[HumanFactors()], [each.human_factors for each in people]]
+    starts = merge.start_distribution(factors, [1.0, 1.0], [[1.0], [1.0, 1.0]])
+    return [draw_initial_state(starts, "assessment", seed, "episode", k).member[1] for k in range(games)]
 
 
 def test_assess__an_episode_is_that_of_its_member_alone(merge: OpenScene, people: dict[str, Persona]) -> None:
     """Driver, human factors and payoff are those of the member: the game is that of the arm with this member alone."""
-    careful, speedy = people["careful"], people["speedy"]
-    members = (
-        Member(driver=Steady(0.1), persona=careful, share=1.0),
-        Member(driver=Steady(0.4), persona=speedy, share=1.0),
-    )
-    mixed = SeatedArm(name="mixed", scene=merge, drivers=(mixture_of(Steady(0.0), careful), Mixture(members)), seed=1)
-    alone = [
-        records(
-            list(
-                assess(
-                    SeatedArm(
-                        name="alone",
-                        scene=merge,
-                        drivers=(mixture_of(Steady(0.0), careful), mixture_of(each.driver, each.persona)),
-                        seed=1,
-                    ),
-                    6,
-                )
-            )
-        )
-        for each in members
-    ]
-    start_distribution = merge.start_distribution(
-        [HumanFactors(), [each.persona.human_factors for each in members]], [1.0, 1.0], [[1.0], [1.0, 1.0]]
-    )
-    member_of = [draw_initial_state(start_distribution, "assessment", 1, "episode", k).member[1] for k in range(6)]
-    assert set(member_of) == {0, 1}
-    assert records(list(assess(mixed, 6))) == [alone[member][k] for k, member in enumerate(member_of)]
+    careful = people["careful"]
+    members = [Member(driver=Steady(0.1), persona=careful), Member(driver=Steady(0.4), persona=people["speedy"])]
 
+    def records(other: Mixture) -> list[dict[str, Any]]:
+        drivers = (mixture_of(Steady(0.0), careful), other)
+        return [game.record for game in assess(SeatedArm(name="any", scene=merge, drivers=drivers, seed=1), 6)]
 
-def test_mixture__of_one_is_the_driver(people: dict[str, Persona]) -> None:
-    driver = Steady(0.0)
-    assert mixture_of(driver, people["careful"]).members == (
-        Member(driver=driver, persona=people["careful"], share=1.0),
-    )
+    alone = [records(Mixture((each,))) for each in members]
+    drove = drawn_members(merge, [each.persona for each in members], 1, 6)
+    assert set(drove) == {0, 1}
+    assert records(Mixture(tuple(members))) == [alone[member][k] for k, member in enumerate(drove)]
 
 
 def test_mixture__invalid_members_are_refused(people: dict[str, Persona]) -> None:
@@ -163,22 +137,13 @@ def test_by_who_drove__has_the_members_of_the_games(merge: OpenScene, people: di
     """Each row has the games in which its member was drawn, and their failures."""
     shares = {"careful": 1.0, "speedy": 1.0}
     members = tuple(Member(driver=Steady(0.2), persona=people[name], share=share) for name, share in shares.items())
-    arm = SeatedArm(
-        name="naive_vs_town",
-        scene=merge,
-        drivers=(mixture_of(Steady(0.0), people["careful"]), Mixture(members)),
-        seed=3,
-    )
+    drivers = (mixture_of(Steady(0.0), people["careful"]), Mixture(members))
+    arm = SeatedArm(name="naive_vs_town", scene=merge, drivers=drivers, seed=3)
     played = pd.DataFrame([{"arm": arm.name, "persona": "town", "seed": 3, **game.record} for game in assess(arm, 8)])
     episodes = typed(played.reindex(columns=list(TABLES["episodes"])))
     campaign = Campaign(name="any", scene="any", personas=["any"], population=[Population(name="town", shares=shares)])
     found = by_who_drove(campaign, episodes).set_index("persona")
-    start_distribution = merge.start_distribution(
-        [HumanFactors(), [HumanFactors(), HumanFactors()]], [1.0, 1.0], [[1.0], [1.0, 1.0]]
-    )
-    drove = [
-        list(shares)[draw_initial_state(start_distribution, "assessment", 3, "episode", k).member[1]] for k in range(8)
-    ]
+    drove = [list(shares)[member] for member in drawn_members(merge, [people[name] for name in shares], 3, 8)]
     assert set(drove) == set(shares)
     for name in shares:
         games_of_member = episodes[[who == name for who in drove]]

@@ -16,15 +16,13 @@ from onnx import TensorProto, helper
 from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
 from harness.config.driver import Onnx, TorchScript
-from harness.drivers.car import Car, car_of
+from harness.drivers.car import Car
 from harness.drivers.network_driver import NetworkDriver
 from harness.drivers.network_export import export_network
 from harness.drivers.policy_file import write_policy
 from harness.drivers.sb3_policy import Sb3Driver
 from harness.errors import DriverError, UsageError
 from harness.game.observation_layout import LAYOUT, SIZE
-from harness.game.roles import EGO
-from harness.road.scene.open_scene import OpenScene
 from tests.support.external_drivers import document, find
 from tests.support.policies import some_policy
 from tests.support.random_observations import Recorded
@@ -34,11 +32,6 @@ GAMES = np.arange(5)
 SEEN = np.random.default_rng(3).uniform(-1.0, 1.0, (5, SIZE)).astype(np.float32)
 NOISE = np.random.default_rng(4).standard_normal((5, 2))
 WEIGHTS = np.random.default_rng(5).normal(0.0, 0.1, (SIZE, 2)).astype(np.float32)
-
-
-@pytest.fixture(scope="module")
-def car(merge: OpenScene) -> Car:
-    return car_of(merge.world, EGO)
 
 
 def onnx_file(
@@ -91,17 +84,10 @@ def test_onnx__scores_of_discrete_actions_choose_one(tmp_path: Path, car: Car) -
         of_onnx(tmp_path / "a.onnx", car).decide(GAMES, SEEN, NOISE)
 
 
-@pytest.mark.parametrize(
-    ("keys", "message"),
-    [
-        ({"input": "state"}, "input: it has no input 'state' (it has obs)"),
-        ({"output": "actoin"}, "output: it has no output 'actoin' (it has mode)"),
-    ],
-)
-def test_onnx__a_name_that_it_has_not_is_an_error(keys: dict[str, str], message: str, tmp_path: Path, car: Car) -> None:
-    with pytest.raises(UsageError) as caught:
-        of_onnx(onnx_file(tmp_path / "a.onnx"), car, **keys)
-    assert message in str(caught.value)
+@pytest.mark.parametrize(("key", "name", "known"), [("input", "state", "obs"), ("output", "actoin", "mode")])
+def test_onnx__a_name_that_it_has_not_is_an_error(key: str, name: str, known: str, tmp_path: Path, car: Car) -> None:
+    with pytest.raises(UsageError, match=rf"{key}: it has no {key} '{name}' \(it has {known}\)"):
+        of_onnx(onnx_file(tmp_path / "a.onnx"), car, **{key: name})
 
 
 def test_onnx__another_observation_is_refused(tmp_path: Path, car: Car) -> None:

@@ -14,11 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.drivers.car import Car, car_of
+from harness.drivers.car import Car
 from harness.drivers.process import ProcessDriver
 from harness.errors import DriverError
 from harness.game.observation_layout import LAYOUT, SIZE
-from harness.game.roles import EGO
 from harness.road.scene.open_scene import OpenScene
 from tests.support.processes import driver, is_running, started
 from tests.support.repository import REPOSITORY
@@ -28,11 +27,6 @@ from tests.support.tiny import wait_for
 GAMES = np.array([3, 7])
 SEEN = np.linspace(-1.0, 1.0, 2 * SIZE, dtype=np.float32).reshape(2, SIZE)
 NOISE = np.array([[0.5, -0.5], [1.0, 2.0]])
-
-
-@pytest.fixture(scope="module")
-def car(merge: OpenScene) -> Car:
-    return car_of(merge.world, EGO)
 
 
 def refusal(driver: ProcessDriver) -> str:

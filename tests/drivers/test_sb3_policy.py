@@ -106,8 +106,8 @@ def test_saved__a_deterministic_policy_can_not_be_sampled(name: str, saved: dict
         Sb3Driver(document(name), saved[name], sampled=True)
 
 
-@pytest.mark.parametrize("name", ALGORITHMS)
-def test_saved__plays_games(name: str, saved: dict[str, Path], merge: OpenScene) -> None:
+def test_saved__plays_games(saved: dict[str, Path], merge: OpenScene) -> None:
+    name = "PPO"
     (game,) = play(arm(merge, Sb3Driver(document(name), saved[name], sampled=False), None), 1)
     assert game.record["error"] == ""
 
@@ -123,17 +123,12 @@ class Other(gymnasium.Env[Any, Any]):
 @pytest.mark.parametrize(
     ("spaces", "message"),
     [
-        (
-            (12, -1.0, 2),
-            "observation_space: its observation space is Box(-1.0, 1.0, (12,), float32), not Box(-1.0, 1.0, (98,)",
-        ),
+        ((12, -1.0, 2), "observation_space: its observation space is Box(-1.0, 1.0, (12,), float32), not Box(-1.0, 1"),
         ((SIZE, 0.0, 2), "its observation space is Box(0.0, 1.0, (98,), float32), not"),
         ((SIZE, -1.0, 1), "action_space: its action space is Box(-1.0, 1.0, (1,), float32), not Box(-1.0, 1.0, (2,)"),
     ],
 )
-def test_saved__a_policy_with_other_spaces_is_refused(
-    spaces: tuple[int, float, int], message: str, tmp_path: Path
-) -> None:
+def test_saved__a_policy_with_other_spaces_is_refused(spaces: Any, message: str, tmp_path: Path) -> None:
     file = tmp_path / "PPO.zip"
     stable_baselines3.PPO("MlpPolicy", Other(*spaces), n_steps=8, batch_size=8, device="cpu").save(file)
     with pytest.raises(UsageError) as caught:

@@ -16,7 +16,7 @@ from harness.errors import UsageError
 from harness.road.scene.open_scene import open_scene
 from tests.support.policies import some_policy
 from tests.support.rollouts import arm, play, trace
-from tests.support.tiny import MERGE
+from tests.support.tiny import CAREFUL, MERGE
 
 FOLLOWING = ("Krauss", "IDM", "EIDM", "ACC", "CACC")
 CHANGING = ("LC2013", "SL2015")
@@ -68,7 +68,7 @@ def test_sumo_types__car_following_models_differ(folder: Path) -> None:
 
 def test_sumo_types__sublanes_allow_a_player_that_leaves_the_road(folder: Path) -> None:
     wild = LearnedDriver(some_policy(), sampled=True)
-    games = play(arm(open_scene(folder, "EIDM_SL2015"), SumoDriver(), wild), 5)
+    games = play(arm(open_scene(folder, "EIDM_SL2015"), SumoDriver(), wild, persona=CAREFUL), 5)
     assert [game.record["error"] for game in games] == [""] * 5
     assert "rail" in [game.record["non_ego_outcome"] for game in games]
 

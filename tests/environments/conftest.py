@@ -8,6 +8,9 @@ from typing import Any
 import libsumo
 import pytest
 
+from harness.environments.arena import Arena, Seat
+from harness.road.scene.open_scene import OpenScene
+
 Open = Callable[..., Any]
 
 
@@ -24,3 +27,15 @@ def opened() -> Iterator[Open]:
     for each in environments:
         each.close()
     assert not libsumo.isLoaded()
+
+
+@pytest.fixture
+def arena_of(opened: Open) -> Open:
+    """Opens arenas of the given drivers, or of learners, and closes them."""
+
+    def arena_of(scene: OpenScene, games: int = 1, *drivers: Any, payoff: Any = None, recorded: bool = False) -> Arena:
+        seats = [Seat(each, payoff) for each in drivers or [None] * len(scene.world.roles)]
+        arena: Arena = opened(Arena, scene, games, seats, seed=1, recorded=recorded)
+        return arena
+
+    return arena_of

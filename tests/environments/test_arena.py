@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import libsumo
@@ -13,14 +14,14 @@ import shapely
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.sumo import SumoDriver
-from harness.environments.arena import Arena, Seat, Step
+from harness.environments.arena import Arena, Step
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.initial_state import InitialState
 from harness.game.observation_layout import LAYOUT, SIZE
 from harness.game.outcome import Outcome
 from harness.game.payoff import Payoff
 from harness.road.demand.route_file import Departure
-from harness.road.scene.open_scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene
 from tests.support.scenes import (
     CROSSING_EDGES,
     CROSSING_NODES,
@@ -52,28 +53,14 @@ def crossing(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
 
 
 @pytest.fixture(scope="module")
-def merge(repository: Any) -> OpenScene:
-    return open_scene(repository / "tests/data/merge")
-
-
-@pytest.fixture(scope="module")
 def payoff(repository: Any) -> Payoff:
     return read_document(repository / "personas/careful.toml", Persona).payoff
 
 
 @pytest.fixture
-def opened(payoff: Payoff) -> Iterator[Open]:
-    """Opens arenas of two learners, or of the given drivers, and closes them."""
-    arenas = []
-
-    def opened(scene: OpenScene, games: int = 1, *drivers: Any) -> Arena:
-        arenas.append(Arena(scene, games, [Seat(each, payoff) for each in drivers or (None, None)], seed=1))
-        return arenas[-1]
-
-    yield opened
-    for each in arenas:
-        each.close()
-    assert not libsumo.isLoaded()
+def arena_of(arena_of: Open, payoff: Payoff) -> Open:
+    """Arenas whose players have a payoff."""
+    return partial(arena_of, payoff=payoff)
 
 
 def after_reset(arena: Arena, start: InitialState, *background: Departure) -> Arena:
@@ -107,8 +94,8 @@ def play_to_the_end(arena: Arena, action: FloatArray = COAST, steps: int = 200) 
 # --- players, SUMO and tiles ------------------------------------------------------------------------------------------
 
 
-def test_step__players_have_the_same_pose_in_sumo_and_arena(merge: OpenScene, opened: Open) -> None:
-    arena = after_reset(opened(merge), drawn(merge, 1))
+def test_step__players_have_the_same_pose_in_sumo_and_arena(merge: OpenScene, arena_of: Open) -> None:
+    arena = after_reset(arena_of(merge), drawn(merge, 1))
     generator = np.random.default_rng(0)
     for _ in range(40):
         arena.step(generator.normal(0.1, 0.1, (1, 2, 2)))
@@ -119,13 +106,13 @@ def test_step__players_have_the_same_pose_in_sumo_and_arena(merge: OpenScene, op
             assert (x - 2.3 * np.cos(heading), y - 2.3 * np.sin(heading), heading) == pytest.approx(pose, abs=1e-3)
 
 
-def test_tiles__games_are_independent(merge: OpenScene, opened: Open) -> None:
+def test_tiles__games_are_independent(merge: OpenScene, arena_of: Open) -> None:
     actions = np.random.default_rng(0).normal(0.05, 0.1, (100, 2, 2))
-    together = opened(merge, 4)
+    together = arena_of(merge, 4)
     together.reset({game: drawn(merge, "tile", game) for game in range(4)})
     four = [(s.payoff.copy(), together.observation.copy()) for s in (together.step(np.array([a] * 4)) for a in actions)]
     together.close()
-    alone = opened(merge)
+    alone = arena_of(merge)
     for game in range(4):
         alone.reload(7)
         alone.reset({0: drawn(merge, "tile", game)})
@@ -135,8 +122,8 @@ def test_tiles__games_are_independent(merge: OpenScene, opened: Open) -> None:
             np.testing.assert_allclose(alone.observation[0], observations[game], atol=1e-6)
 
 
-def test_reset__of_one_game_has_no_effect_on_the_others(merge: OpenScene, opened: Open) -> None:
-    arena, start = opened(merge, 2), drawn(merge, "restart")
+def test_reset__of_one_game_has_no_effect_on_the_others(merge: OpenScene, arena_of: Open) -> None:
+    arena, start = arena_of(merge, 2), drawn(merge, "restart")
     arena.reset({0: start, 1: drawn(merge, "goes on")})
     first = arena.observation[0].copy()
     actions = np.random.default_rng(0).normal(0.0, 0.05, (20, 2, 2, 2))
@@ -150,16 +137,16 @@ def test_reset__of_one_game_has_no_effect_on_the_others(merge: OpenScene, opened
         np.testing.assert_array_equal(arena.observation[0], expected)
 
 
-def test_step__quantities_of_earlier_steps_do_not_change(merge: OpenScene, opened: Open) -> None:
-    arena = after_reset(opened(merge), drawn(merge, 1))
+def test_step__quantities_of_earlier_steps_do_not_change(merge: OpenScene, arena_of: Open) -> None:
+    arena = after_reset(arena_of(merge), drawn(merge, 1))
     steps = [arena.step(COAST) for _ in range(5)]
     travelled = [float(step.quantities.state.x_m[0, 0]) for step in steps]
     assert np.diff(travelled) == pytest.approx([0.1 * drawn(merge, 1).speed_mps[0]] * 4)
     assert [int(step.quantities.state.step[0]) for step in steps] == [1, 2, 3, 4, 5]
 
 
-def test_step__the_first_step_has_an_advance(straight: OpenScene, opened: Open) -> None:
-    arena = after_reset(opened(straight), placed(straight, (40.2, RIGHT_Y, 0, 10), (60.2, LEFT_Y, 0, 7)))
+def test_step__the_first_step_has_an_advance(straight: OpenScene, arena_of: Open) -> None:
+    arena = after_reset(arena_of(straight), placed(straight, (40.2, RIGHT_Y, 0, 10), (60.2, LEFT_Y, 0, 7)))
     np.testing.assert_allclose(arena.step(COAST).quantities.advanced_m, [[1.0, 0.7]], atol=1e-9)
 
 
@@ -167,9 +154,9 @@ def test_step__the_first_step_has_an_advance(straight: OpenScene, opened: Open) 
 
 
 @pytest.mark.parametrize("background", [False, True])
-def test_goal__the_player_is_removed_and_the_other_continues(background: bool, tmp_path: Any, opened: Open) -> None:
+def test_goal__the_player_is_removed_and_the_other_continues(background: bool, tmp_path: Any, arena_of: Open) -> None:
     road = build_scene(tmp_path, others=FLOW.format("road") if background else "")
-    arena = after_reset(opened(road), placed(road, (240, RIGHT_Y, 0, 10), (200, LEFT_Y, 0, 10)))
+    arena = after_reset(arena_of(road), placed(road, (240, RIGHT_Y, 0, 10), (200, LEFT_Y, 0, 10)))
     for _ in range(10):
         step = arena.step(COAST)
     assert outcomes(arena) == ["goal", ""]
@@ -181,8 +168,8 @@ def test_goal__the_player_is_removed_and_the_other_continues(background: bool, t
     assert arena.observation[0, 1, LAYOUT.index("other0_seen")] == 0.0
 
 
-def test_wreck__stays_as_an_obstacle_without_speed_or_payoff(straight: OpenScene, opened: Open) -> None:
-    arena = after_reset(opened(straight), placed(straight, (100, RIGHT_Y, 0, 10), (120, RIGHT_Y, 0.6, 10)))
+def test_wreck__stays_as_an_obstacle_without_speed_or_payoff(straight: OpenScene, arena_of: Open) -> None:
+    arena = after_reset(arena_of(straight), placed(straight, (100, RIGHT_Y, 0, 10), (120, RIGHT_Y, 0.6, 10)))
     while not outcomes(arena)[1]:
         arena.step(COAST)
     assert outcomes(arena) == ["", "rail"]
@@ -195,9 +182,9 @@ def test_wreck__stays_as_an_obstacle_without_speed_or_payoff(straight: OpenScene
     assert (arena.step(COAST).payoff == 0.0).all()
 
 
-def test_wreck__of_a_player_driven_by_sumo_stands_in_sumo_too(straight: OpenScene, opened: Open) -> None:
+def test_wreck__of_a_player_driven_by_sumo_stands_in_sumo_too(straight: OpenScene, arena_of: Open) -> None:
     start = placed(straight, (100, RIGHT_Y, 0, 12), (107, RIGHT_Y, 0, 3))
-    arena = after_reset(opened(straight, 1, None, SumoDriver()), start)
+    arena = after_reset(arena_of(straight, 1, None, SumoDriver()), start)
     play_to_the_end(arena, np.array([[[1.0, 0.0], [0.0, 0.0]]]))
     assert outcomes(arena) == ["collision", "collision"]
     for _ in range(10):
@@ -205,21 +192,21 @@ def test_wreck__of_a_player_driven_by_sumo_stands_in_sumo_too(straight: OpenScen
     assert libsumo.vehicle.getPosition("non_ego")[0] - 2.3 == pytest.approx(arena.state.x_m[0, 1])
 
 
-def test_timeout__ends_the_game_at_the_limit(straight: OpenScene, opened: Open) -> None:
-    arena = after_reset(opened(straight), placed(straight, (100, RIGHT_Y, 0, 0), (100, LEFT_Y, 0, 0)))
+def test_timeout__ends_the_game_at_the_limit(straight: OpenScene, arena_of: Open) -> None:
+    arena = after_reset(arena_of(straight), placed(straight, (100, RIGHT_Y, 0, 0), (100, LEFT_Y, 0, 0)))
     assert len(play_to_the_end(arena, steps=500)) == straight.world.steps == 200
     assert outcomes(arena) == ["timeout", "timeout"]
 
 
-def test_outcome__contact_has_priority_over_goal_and_time(straight: OpenScene, opened: Open) -> None:
-    arena = after_reset(opened(straight), placed(straight, (249.5, RIGHT_Y, 0, 10), (253, RIGHT_Y, 0, 0)))
+def test_outcome__contact_has_priority_over_goal_and_time(straight: OpenScene, arena_of: Open) -> None:
+    arena = after_reset(arena_of(straight), placed(straight, (249.5, RIGHT_Y, 0, 10), (253, RIGHT_Y, 0, 0)))
     arena.step(COAST)
     assert outcomes(arena) == ["collision", "collision"]
 
 
 @pytest.mark.parametrize("heading", [0.0, 0.3, -0.7, np.pi / 2, 2.5])
-def test_contact__of_turned_boxes_is_found_in_its_step(straight: OpenScene, opened: Open, heading: float) -> None:
-    arena = after_reset(opened(straight), placed(straight, (100, -3.2, 0, 15), (115, -3.0, heading, 0)))
+def test_contact__of_turned_boxes_is_found_in_its_step(straight: OpenScene, arena_of: Open, heading: float) -> None:
+    arena = after_reset(arena_of(straight), placed(straight, (100, -3.2, 0, 15), (115, -3.0, heading, 0)))
     *before, last = play_to_the_end(arena)
     assert outcomes(arena) == ["collision", "collision"]
     assert shapely.intersects(*bodies(last))
@@ -228,9 +215,9 @@ def test_contact__of_turned_boxes_is_found_in_its_step(straight: OpenScene, open
 
 @pytest.mark.parametrize("heading", [0.2, -0.2, 0.9, -1.4])
 def test_rail__contact_is_in_the_step_in_which_the_body_leaves_the_road(
-    straight: OpenScene, opened: Open, heading: float
+    straight: OpenScene, arena_of: Open, heading: float
 ) -> None:
-    arena = after_reset(opened(straight), placed(straight, (100, -3.2, heading, 10), None))
+    arena = after_reset(arena_of(straight), placed(straight, (100, -3.2, heading, 10), None))
     *before, last = play_to_the_end(arena)
     road = shapely.box(-50, -6.4, 350, 0)
     assert outcomes(arena) == ["rail", ""]
@@ -238,16 +225,16 @@ def test_rail__contact_is_in_the_step_in_which_the_body_leaves_the_road(
     assert all(shapely.covers(road.buffer(0.02), bodies(step)[0]) for step in before)
 
 
-def test_contact__on_a_junction_is_found(crossing: OpenScene, opened: Open) -> None:
-    arena = after_reset(opened(crossing), placed(crossing, (-20, -1.6, 0, 10), (1.6, -21, np.pi / 2, 10)))
+def test_contact__on_a_junction_is_found(crossing: OpenScene, arena_of: Open) -> None:
+    arena = after_reset(arena_of(crossing), placed(crossing, (-20, -1.6, 0, 10), (1.6, -21, np.pi / 2, 10)))
     *_, last = play_to_the_end(arena)
     assert outcomes(arena) == ["collision", "collision"]
     assert shapely.intersects(*bodies(last))
     assert (np.abs(last.quantities.state.x_m[0]) < 6).all()
 
 
-def test_junction__has_no_rails_on_the_route(crossing: OpenScene, opened: Open) -> None:
-    arena = after_reset(opened(crossing), placed(crossing, (-20, -1.6, 0, 10), None))
+def test_junction__has_no_rails_on_the_route(crossing: OpenScene, arena_of: Open) -> None:
+    arena = after_reset(arena_of(crossing), placed(crossing, (-20, -1.6, 0, 10), None))
     play_to_the_end(arena)
     assert outcomes(arena)[0] == "goal"
 
@@ -255,8 +242,8 @@ def test_junction__has_no_rails_on_the_route(crossing: OpenScene, opened: Open) 
 # --- players and background traffic driven by SUMO --------------------------------------------------------------------
 
 
-def test_sumo_driver__merges_and_reaches_the_goal(merge: OpenScene, opened: Open) -> None:
-    arena = opened(merge, 1, SumoDriver(), SumoDriver())
+def test_sumo_driver__merges_and_reaches_the_goal(merge: OpenScene, arena_of: Open) -> None:
+    arena = arena_of(merge, 1, SumoDriver(), SumoDriver())
     for episode in range(3):
         arena.reload(episode)
         after_reset(arena, drawn(merge, "sumo", episode))
@@ -269,9 +256,9 @@ def test_sumo_driver__merges_and_reaches_the_goal(merge: OpenScene, opened: Open
         assert max(np.abs(step.quantities.state.acceleration_mps2).max() for step in steps) < 8.0
 
 
-def test_background__is_observed_at_its_position_in_sumo(straight: OpenScene, opened: Open) -> None:
+def test_background__is_observed_at_its_position_in_sumo(straight: OpenScene, arena_of: Open) -> None:
     arena = after_reset(
-        opened(straight),
+        arena_of(straight),
         placed(straight, (100, RIGHT_Y, 0, 10), None),
         Departure(name="van", vehicle_type="van", edges=("road",), depart_s=0.0, lane="1", position="123", speed="10"),
     )
@@ -285,9 +272,9 @@ def test_background__is_observed_at_its_position_in_sumo(straight: OpenScene, op
     assert seen["other0_left_m"] == pytest.approx(3.2 / (3.2 + 8.0), abs=1e-5)
 
 
-def test_background__contact_is_a_collision(straight: OpenScene, opened: Open) -> None:
+def test_background__contact_is_a_collision(straight: OpenScene, arena_of: Open) -> None:
     arena = after_reset(
-        opened(straight),
+        arena_of(straight),
         placed(straight, (100, RIGHT_Y, 0, 12), None),
         Departure(name="van", vehicle_type="van", edges=("road",), depart_s=0.0, lane="0", position="120", speed="1"),
     )
@@ -299,8 +286,8 @@ def test_background__contact_is_a_collision(straight: OpenScene, opened: Open) -
         assert shapely.intersects(bodies(step)[0], van) == touches
 
 
-def test_background__is_reset_with_its_game(straight: OpenScene, opened: Open) -> None:
-    arena, start = opened(straight), placed(straight, (150, RIGHT_Y, 0, 0), None)
+def test_background__is_reset_with_its_game(straight: OpenScene, arena_of: Open) -> None:
+    arena, start = arena_of(straight), placed(straight, (150, RIGHT_Y, 0, 0), None)
     van = Departure(name="van", vehicle_type="van", edges=("road",), depart_s=0.3, lane="1", position="50", speed="8")
     for _ in range(2):
         after_reset(arena, start, van)
@@ -316,7 +303,7 @@ def test_background__is_reset_with_its_game(straight: OpenScene, opened: Open) -
 # --- observations ------------------------------------------------------------------------------------------------
 
 
-def test_drivers__have_the_observations_of_learners(merge: OpenScene, opened: Open) -> None:
+def test_drivers__have_the_observations_of_learners(merge: OpenScene, arena_of: Open) -> None:
     received: list[FloatArray] = []
 
     class Recording:
@@ -329,25 +316,25 @@ def test_drivers__have_the_observations_of_learners(merge: OpenScene, opened: Op
             received.append(observation.copy())
             return np.zeros((len(games), 2))
 
-    learner = after_reset(opened(merge), drawn(merge, 5))
+    learner = after_reset(arena_of(merge), drawn(merge, 5))
     seen = []
     for _ in range(30):
         seen.append(learner.observation[0, 1].copy())
         learner.step(COAST)
     learner.close()
-    driven = after_reset(opened(merge, 1, None, Recording()), drawn(merge, 5))
+    driven = after_reset(arena_of(merge, 1, None, Recording()), drawn(merge, 5))
     for _ in range(30):
         driven.step(COAST)
     np.testing.assert_array_equal(np.concatenate(received), np.array(seen))
 
 
 @pytest.mark.parametrize("net", ["straight", "zipper"])
-def test_soak__random_driving_in_traffic_keeps_all_invariants(tmp_path: Any, opened: Open, net: str) -> None:
+def test_soak__random_driving_in_traffic_keeps_all_invariants(tmp_path: Any, arena_of: Open, net: str) -> None:
     if net == "zipper":
         scene = build_scene(tmp_path, ZIPPER_NODES, ZIPPER_EDGES, ZIPPER, FLOW.format("wide narrow"), goal_m=50.0)
     else:
         scene = build_scene(tmp_path, others=FLOW.format("road"))
-    arena, generator, ended = opened(scene, 4), np.random.default_rng(0), []
+    arena, generator, ended = arena_of(scene, 4), np.random.default_rng(0), []
     waiting = list(range(4))
     for k in range(800):
         arena.reset(

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from harness.environments.arena import Arena, Seat
+from harness.environments.arena import Arena
 from harness.environments.auto_reset import AutoReset
 from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import InitialState, draw_initial_state
@@ -20,6 +20,7 @@ from tests.support.scenes import build_scene
 
 TILES = 4
 FLOW = '<flow id="van" type="van" begin="0" end="20" probability="0.3"><route edges="road"/></flow>'
+Open = Callable[..., Arena]
 
 
 class _RecordingArena:
@@ -60,10 +61,7 @@ def test_games__of_a_tile_do_not_depend_on_other_tiles(scene: OpenScene, order: 
         assert departures == (scene.departures(generator_of(*parts, "others")) if scene.has_background_traffic else [])
 
 
-def test_games__start_in_the_arena(scene: OpenScene) -> None:
-    arena = Arena(scene, TILES, [Seat(None), Seat(None)])
-    try:
-        AutoReset(arena, scene.start_distribution([HumanFactors(), HumanFactors()], [1.0, 1.0]), "a").reset([2])
-        assert arena.state.present.tolist() == [[game == 2] * 2 for game in range(TILES)]
-    finally:
-        arena.close()
+def test_games__start_in_the_arena(scene: OpenScene, arena_of: Open) -> None:
+    arena = arena_of(scene, TILES)
+    AutoReset(arena, scene.start_distribution([HumanFactors(), HumanFactors()], [1.0, 1.0]), "a").reset([2])
+    assert arena.state.present.tolist() == [[game == 2] * 2 for game in range(TILES)]

@@ -64,21 +64,16 @@ def weights_of(model: Any) -> np.ndarray:
     return np.concatenate([each.detach().numpy().ravel() for each in model.policy.parameters()])
 
 
-def test_recurrent_ppo__learns(opened: Open, short: OpenScene) -> None:
+@pytest.mark.parametrize("name", ["RecurrentPPO", "DQN"])
+def test_learner__learns(name: str, opened: Open, short: OpenScene) -> None:
     game = opened(DrivingEnv, scene=short, other="sumo")
-    sizes = {"net_arch": [16], "lstm_hidden_size": 8}
-    model = RecurrentPPO("MlpLstmPolicy", game, n_steps=64, batch_size=32, n_epochs=1, policy_kwargs=sizes, seed=1)
-    before = weights_of(model)
-    model.learn(128)
-    assert model.num_timesteps == 128
-    assert np.isfinite(weights_of(model)).all()
-    assert (weights_of(model) != before).any()
-
-
-def test_dqn__learns_with_a_table_of_actions(opened: Open, short: OpenScene) -> None:
-    game = opened(DrivingEnv, scene=short, other="sumo")
-    discrete = TransformAction(game, lambda index: CHOICES[index], Discrete(len(CHOICES)))
-    model = DQN("MlpPolicy", discrete, learning_starts=32, batch_size=16, buffer_size=200, seed=1)
+    model: Any
+    if name == "DQN":
+        discrete = TransformAction(game, lambda index: CHOICES[index], Discrete(len(CHOICES)))
+        model = DQN("MlpPolicy", discrete, learning_starts=32, batch_size=16, buffer_size=200, seed=1)
+    else:
+        sizes = {"net_arch": [16], "lstm_hidden_size": 8}
+        model = RecurrentPPO("MlpLstmPolicy", game, n_steps=64, batch_size=32, n_epochs=1, policy_kwargs=sizes, seed=1)
     before = weights_of(model)
     model.learn(128)
     assert np.isfinite(weights_of(model)).all()

@@ -184,27 +184,14 @@ def test_step__the_time_limit_truncates(opened: Open, busy: OpenScene) -> None:
     assert (len(steps), terminated, truncated, info["outcome"]) == (30, False, True, Outcome.TIMEOUT)
 
 
-def test_step__needs_a_running_game_and_finite_actions(opened: Open) -> None:
+def test_step__needs_a_running_game(opened: Open) -> None:
     environment = opened(DrivingEnv)
     with pytest.raises(gymnasium.error.ResetNeeded):
         environment.step(STRAIGHT_ON)
     environment.reset(seed=1)
-    with pytest.raises(ValueError, match="finite"):
-        environment.step(np.array([np.nan, 0.0]))
     played(environment, SWERVE)
     with pytest.raises(gymnasium.error.ResetNeeded):
         environment.step(STRAIGHT_ON)
-
-
-@pytest.mark.parametrize(("player", "learner"), [("ego", 0), ("non_ego", 1)])
-def test_player__is_the_learner(opened: Open, player: str, learner: int) -> None:
-    environment = opened(DrivingEnv, player=player)
-    environment.reset(seed=1)
-    arena = environment._game.arena
-    assert arena.state.present[0].tolist() == [learner == 0, learner == 1]
-    before = arena.state.x_m[0, learner]
-    environment.step(STRAIGHT_ON)
-    assert arena.state.x_m[0, learner] > before
 
 
 def test_other__a_policy_has_its_personas_attention(opened: Open, policy: Path) -> None:

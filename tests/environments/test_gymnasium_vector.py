@@ -10,9 +10,7 @@ import libsumo
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
-from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
-import harness
 from harness import Outcome, UsageError, VectorDrivingEnv, make_vec
 from harness.game.observation_layout import LAYOUT, SIZE
 from harness.road.scene.open_scene import OpenScene
@@ -87,14 +85,6 @@ def test_step__a_wreck_terminates(opened: Callable[..., Any]) -> None:
     assert not info["final_info"]["is_success"].any()
 
 
-def test_wrappers__of_gymnasium_count_the_episodes(opened: Callable[..., Any], short: OpenScene) -> None:
-    environment = opened(RecordEpisodeStatistics, VectorDrivingEnv(GAMES, scene=short))
-    environment.reset(seed=1)
-    for _ in range(30):
-        *_, info = environment.step(actions())
-    assert info["episode"]["l"].tolist() == [30] * GAMES
-
-
 @pytest.mark.parametrize(
     "wrong", [np.zeros(2), np.zeros((GAMES, 3)), np.full((GAMES, 2), np.nan)], ids=["one game", "three", "nan"]
 )
@@ -125,7 +115,3 @@ def test_sb3__learns_on_it_and_the_seed_gives_the_same_games(opened: Callable[..
         environments[0].step(np.zeros((GAMES, 3)))
     model = PPO("MlpPolicy", environments[0], n_steps=16, batch_size=32, n_epochs=1, device="cpu").learn(64)
     assert model.num_timesteps == 64
-
-
-def test_public__names() -> None:
-    assert harness.make_vec is make_vec

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
@@ -17,6 +17,8 @@ from harness.game.outcome import Outcome
 from harness.game.roles import NON_EGO
 from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.repository import REPOSITORY
+
+Open = Callable[..., Arena]
 
 
 @pytest.fixture(scope="module")
@@ -69,18 +71,15 @@ def test_ordinary_walker__and_sumos_ego_meet_without_harm(crossing: OpenScene) -
     assert outcomes == {"GOAL": 6}
 
 
-def test_walker__is_hit_as_its_body_is(crossing: OpenScene) -> None:
+def test_walker__is_hit_as_its_body_is(crossing: OpenScene, arena_of: Open) -> None:
     """The ego's left side is 0.9 m beside its line at y = -1.75, a walker reaches 0.25 m to the side."""
     start = start_of(crossing, 0)
-    arena = Arena(crossing, 1, [Seat(None)] * 2)
-    try:
-        for beside_m, outcome in ((1.14, Outcome.COLLISION), (1.2, Outcome.RUNNING)):
-            start.x_m[:], start.y_m[:] = (100.0, 101.0), (-1.75, -1.75 + beside_m)
-            start.heading_rad[:], start.speed_mps[:], start.station_m[:] = (0.0, np.pi / 2.0), 0.0, (100.0, 24.0)
-            arena.reset({0: start})
-            step = arena.step(np.zeros((1, 2, 2)))
-            assert arena.state.outcome[0].tolist() == [outcome, outcome]
-            assert step.quantities.on_carriageway[0].tolist() == [0.0, 1.0]
-            assert step.quantities.stands[0].tolist() == [1.0, 1.0]
-    finally:
-        arena.close()
+    arena = arena_of(crossing, 1)
+    for beside_m, outcome in ((1.14, Outcome.COLLISION), (1.2, Outcome.RUNNING)):
+        start.x_m[:], start.y_m[:] = (100.0, 101.0), (-1.75, -1.75 + beside_m)
+        start.heading_rad[:], start.speed_mps[:], start.station_m[:] = (0.0, np.pi / 2.0), 0.0, (100.0, 24.0)
+        arena.reset({0: start})
+        step = arena.step(np.zeros((1, 2, 2)))
+        assert arena.state.outcome[0].tolist() == [outcome, outcome]
+        assert step.quantities.on_carriageway[0].tolist() == [0.0, 1.0]
+        assert step.quantities.stands[0].tolist() == [1.0, 1.0]

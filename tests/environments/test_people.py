@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,35 +21,21 @@ from harness.environments.vector_env import ArenaVecEnv, JoinedVecEnv
 from harness.evaluation.columns import TABLES
 from harness.evaluation.people import COLLIDED_WITH, columns_for
 from harness.evaluation.tables import typed
-from harness.game.arrays import FloatArray, IntArray
+from harness.game.arrays import FloatArray
 from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import draw_initial_state
 from harness.road.scene.open_scene import OpenScene, open_scene
-from tests.support.rollouts import play, seated, trace
+from tests.support.rollouts import Steady, play, seated, trace
 from tests.support.scenes import LEFT_Y, RIGHT_Y, THREE_PEOPLE, build_scene, placed
 from tests.support.tiny import CAREFUL
 
 ROLES = ["ego", "non_ego", "non_ego_2", "non_ego_3"]
+Open = Callable[..., Arena]
 
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
     return build_scene(tmp_path_factory.mktemp("scenes") / "three", places=THREE_PEOPLE)
-
-
-class Pedals:
-    """Holds its pedals, and its wheel straight."""
-
-    takes_over = True
-
-    def __init__(self, pedals: float) -> None:
-        self.action = [pedals, 0.0]
-
-    def reset(self, games: IntArray) -> None:
-        """Nothing to forget."""
-
-    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
-        return np.tile(self.action, (len(games), 1))
 
 
 def played(scene: OpenScene, *drivers: Any, episodes: int = 1) -> list[Game]:
@@ -71,24 +58,15 @@ def test_game__has_a_track_and_a_record_of_each_player(scene: OpenScene) -> None
 
 
 def test_game__names_the_person_that_the_ego_collided_with(scene: OpenScene) -> None:
-    (game,) = played(scene, Pedals(1.0), SumoDriver(), Pedals(-0.2), SumoDriver())
+    (game,) = played(scene, Steady(1.0), SumoDriver(), Steady(-0.2), SumoDriver())
     (row,) = table([game]).to_dict("records")
     assert (row["ego_outcome"], row[COLLIDED_WITH]) == ("collision", "non_ego_2")
-    assert (row["non_ego_outcome"], row["non_ego_2_outcome"], row["non_ego_3_outcome"]) == (
-        "goal",
-        "collision",
-        "goal",
-    )
+    assert [row[f"{role}_outcome"] for role in ROLES[1:]] == ["goal", "collision", "goal"]
 
 
 def test_game__people_without_an_ego_drive_one_at_a_time(scene: OpenScene) -> None:
-    games = played(scene, None, *[Pedals(0.3)] * 3, episodes=4)
-    assert [set(trace(game)["player"]) for game in games] == [
-        {"non_ego"},
-        {"non_ego_2"},
-        {"non_ego_3"},
-        {"non_ego"},
-    ]
+    games = played(scene, None, *[Steady(0.3)] * 3, episodes=4)
+    assert [set(trace(game)["player"]) for game in games] == [{role} for role in (*ROLES[1:], ROLES[1])]
     rows = table(games)
     assert (rows["ego_outcome"] == "").all()
     assert rows["non_ego_2_outcome"].tolist() == ["", "goal", "", ""]
@@ -104,15 +82,12 @@ def test_start__players_that_are_sometimes_absent_are_absent_together(scene: Ope
     assert 0.35 < present[:, 1].mean() < 0.65
 
 
-def test_step__quantities_of_four_players(scene: OpenScene) -> None:
+def test_step__quantities_of_four_players(scene: OpenScene, arena_of: Open) -> None:
     # The ego, at 15 m/s, follows person 2, at 10 m/s, 20 m ahead; persons 1 and 3 are side by side with them.
-    arena = Arena(scene, 1, [Seat(None)] * 4)
+    arena = arena_of(scene, 1)
     poses = [(40.0, RIGHT_Y, 0.0, 15.0), (40.0, LEFT_Y, 0.0, 8.0), (60.0, RIGHT_Y, 0.0, 10.0), (60.0, LEFT_Y, 0.0, 8.0)]
-    try:
-        arena.reset({0: placed(scene, *poses)})
-        q = arena.step(np.zeros((1, 4, 2))).quantities
-    finally:
-        arena.close()
+    arena.reset({0: placed(scene, *poses)})
+    q = arena.step(np.zeros((1, 4, 2))).quantities
     moved_m = q.state.x_m[0] - [40.0, 40.0, 60.0, 60.0]
     gap_m = 20.0 + moved_m[2] - moved_m[0] - 4.6
     closing_mps = q.state.speed_mps[0, 0] - q.state.speed_mps[0, 2]

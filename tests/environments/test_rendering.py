@@ -57,12 +57,6 @@ def test_rgb_array__is_collected_by_gymnasiums_wrapper(opened: Open) -> None:
     assert environment.metadata["render_fps"] == 10
 
 
-def test_rgb_array__of_the_parallel_environment(opened: Open) -> None:
-    environment = opened(ParallelDrivingEnv, render_mode="rgb_array")
-    environment.reset(seed=1)
-    assert len(pixels_of(environment.render(), BLUE))
-
-
 HUMAN = """
 import numpy as np, harness
 environment = harness.DrivingEnv(render_mode="human")
@@ -127,11 +121,11 @@ def test_options__others_are_refused(opened: Open) -> None:
 # --- what is refused --------------------------------------------------------------------------------------------------
 
 
-def test_action__another_shape_is_refused(opened: Open) -> None:
+def test_action__another_shape_and_nan_are_refused(opened: Open) -> None:
     environment = opened(DrivingEnv)
     environment.reset(seed=1)
-    for action in (np.zeros(3), 0.5, np.zeros((1, 2)), [0.0]):
-        with pytest.raises(ValueError, match=r"not \(2,\): pedals and wheel"):
+    for action in (np.zeros(3), 0.5, np.zeros((1, 2)), [0.0], [np.nan, 0.0]):
+        with pytest.raises(ValueError, match=r"not \(2,\): pedals and wheel|an action is not finite"):
             environment.step(action)
 
 

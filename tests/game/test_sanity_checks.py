@@ -53,6 +53,7 @@ class Misbehaving(Steady):
     """Makes an invalid decision in the fifth step of every second game."""
 
     def __init__(self, decision: Callable[[FloatArray], Any]) -> None:
+        super().__init__()
         self._decision, self._games, self._steps = decision, 0, 0
 
     def reset(self, games: IntArray) -> None:
