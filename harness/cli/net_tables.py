@@ -8,9 +8,8 @@ from rich.table import Table
 from rich.text import Text
 
 from harness.errors import plain
-from harness.maps.candidates import CandidateKind
+from harness.maps.candidates import CandidateKind, ListedConflict, Priority
 from harness.maps.game_plans import GamePlan
-from harness.maps.net_conflicts import ListedConflict, Priority
 from harness.road.net.net_listing import ListedLane
 
 _RULES = {Priority.FIRST: "the first", Priority.FIRST_TO_ARRIVE: "first to arrive", Priority.NONE: "no rule"}

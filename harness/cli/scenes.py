@@ -45,7 +45,7 @@ def show_scene(
     goals.
     """
     from harness.cli.net_tables import conflict_table, conflict_words, lane_table
-    from harness.maps.net_conflicts import listed_conflicts
+    from harness.maps.candidates import listed_conflicts
     from harness.road.net.net_file import check_net
     from harness.road.net.net_listing import edges_near, listed_junctions, listed_lanes
     from harness.road.net.network import read_net

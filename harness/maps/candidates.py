@@ -1,17 +1,18 @@
-"""Candidates for games on a net: places where the ways of two road users cross or merge, from the net's right of way.
+"""Conflicts at the junctions of a net, and candidates for games: places where the ways of two road users meet.
 
 Connections of the same two pairs of edges are one candidate, whatever their lanes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from enum import Enum
-from itertools import chain
+from enum import Enum, auto
+from itertools import chain, combinations
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 from sumolib.net import Net
 from sumolib.net.connection import Connection
@@ -20,9 +21,8 @@ from sumolib.net.lane import Lane
 from sumolib.net.node import Node
 
 from harness.game.arrays import FloatArray
-from harness.maps.net_conflicts import Priority, foe_pairs, in_order, place_of
 from harness.road.net.network import car_lanes, is_for_cars, lane_line
-from harness.road.net.right_of_way_table import overlap_of
+from harness.road.net.right_of_way_table import foes_of, overlap_of, yields_to
 from harness.road.net.route_table import line_over_junction
 from harness.road.net.stream import Feeders, Stream
 
@@ -30,6 +30,29 @@ _OPPOSITE = -0.7  # cosine of the angle between two approaches that come towards
 _STRAIGHT = 0.87  # of the angle by which a way over a junction turns
 _FORK = 3  # arms of a junction at which all ways may turn; elsewhere, two ways that turn make no scene
 _BESIDE_M = 6.0  # of a junction, in which a crossing may be
+
+
+class Priority(Enum):
+    """Which of two connections has priority, apart from signals."""
+
+    FIRST = auto()
+    FIRST_TO_ARRIVE = auto()
+    NONE = auto()  # the net has no rule
+
+
+@dataclass(frozen=True, kw_only=True)
+class ListedConflict:
+    """A conflict of two connections of a junction. If one of them has priority, it is the first."""
+
+    number: int
+    junction: str
+    merging: bool  # both lead to the same lane; else they cross
+    first: tuple[str, str]
+    """The lanes before and behind the junction."""
+    second: tuple[str, str]
+    priority: Priority
+    with_signals: bool
+    place: FloatArray  # [2] where they cross, or where the common lane begins
 
 
 class CandidateKind(Enum):
@@ -80,6 +103,59 @@ class Candidate:
         """By kind, then by name."""
         second = self.second.edges if self.second is not None else ()
         return list(CandidateKind).index(self.kind), self.junction, self.first.edges, second
+
+
+def listed_conflicts(net: Net, junctions: Sequence[str]) -> list[ListedConflict]:
+    """The conflicts at junctions, numbered from 1 in the order of the junctions."""
+    feeders = Feeders(net)
+    found: list[ListedConflict] = []
+    for junction in junctions:
+        links = net.getNode(junction).getConnections()
+        streams = {link: Stream(link, feeders) for link in links}
+        for one, other in foe_pairs(links):
+            overlap = overlap_of(streams[one], streams[other])
+            if overlap is None:
+                continue
+            first, second, priority = in_order(one, other)
+            found.append(
+                ListedConflict(
+                    number=len(found) + 1,
+                    junction=junction,
+                    merging=one.getToLane() is other.getToLane(),
+                    first=(first.getFromLane().getID(), first.getToLane().getID()),
+                    second=(second.getFromLane().getID(), second.getToLane().getID()),
+                    priority=priority,
+                    with_signals=bool(one.getTLSID() or other.getTLSID()),
+                    place=place_of(one, other, overlap),
+                )
+            )
+    return found
+
+
+def foe_pairs(links: Sequence[Connection]) -> Iterator[tuple[Connection, Connection]]:
+    """The connections of a junction whose traffic may be in conflict, two by two."""
+    foes = {link: set(foes_of(link)) for link in links}
+    for one, other in combinations(links, 2):
+        if other in foes[one] and one in foes[other]:
+            yield one, other
+
+
+def in_order(one: Connection, other: Connection) -> tuple[Connection, Connection, Priority]:
+    """Two connections and their priority; if one of them has it, it is the first."""
+    one_yields, first_come = yields_to(one, other)
+    other_yields, _ = yields_to(other, one)
+    if first_come:
+        return one, other, Priority.FIRST_TO_ARRIVE
+    if not one_yields and not other_yields:
+        return one, other, Priority.NONE
+    return (other, one, Priority.FIRST) if one_yields else (one, other, Priority.FIRST)
+
+
+def place_of(one: Connection, other: Connection, overlap: BaseGeometry) -> FloatArray:
+    """[2] where two connections with a common area cross, or where the lane begins to which both lead."""
+    if one.getToLane() is other.getToLane():
+        return lane_line(one.getToLane())[0]
+    return np.array(overlap.centroid.coords[0])
 
 
 def candidates(net: Net) -> list[Candidate]:

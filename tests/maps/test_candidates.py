@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from harness.maps.candidates import Candidate, CandidateKind, candidates, following
+from harness.maps.candidates import Candidate, CandidateKind, Priority, candidates, following
 from harness.maps.import_map import import_map
-from harness.maps.net_conflicts import Priority
 from harness.road.net.network import read_net
 from tests.support.repository import REPOSITORY
 from tests.support.scenes import CROSSING_EDGES, CROSSING_NODES, STRAIGHT_EDGES, STRAIGHT_NODES

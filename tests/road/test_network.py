@@ -146,9 +146,6 @@ def clearance(rails: Rails, route: Route, offset_m: float = 0.0) -> FloatArray:
     return rails.distance_m(cars, 10.0)
 
 
-# --- the merge scene -------------------------------------------------------------------------------------------------
-
-
 def test_merge__rails_are_in_their_places(merge: OpenScene) -> None:
     lines = sorted(merge.rail_lines, key=lambda line: line[:, 1].mean())
     assert len(lines) == 2
@@ -184,9 +181,6 @@ def test_merge__goal_and_limit(merge: OpenScene) -> None:
     assert (routes.speed_limit_mps == 13.89).all()
 
 
-# --- the shipped scene -----------------------------------------------------------------------------------------------
-
-
 def test_shipped_merge__has_a_drivable_shoulder_and_a_taper_on_the_left(repository: Path) -> None:
     scene = open_scene(repository / "networks" / "merge")
     low, high = (shapely.LineString(line) for line in sorted(scene.rail_lines, key=lambda line: line[:, 1].mean()))
@@ -196,9 +190,6 @@ def test_shipped_merge__has_a_drivable_shoulder_and_a_taper_on_the_left(reposito
     row = routes.first_row[0] + round((50.0 + MARGIN_M) / SPACING_M)
     assert routes.lane_offset_m[row].tolist() == pytest.approx([0.0, 3.2])  # the shoulder is not a lane of the route
     assert routes.lane_end_m[row].tolist() == [np.inf, 100.0]
-
-
-# --- any net ---------------------------------------------------------------------------------------------------------
 
 
 @EVERY_NET

@@ -44,9 +44,6 @@ def only(folder: Path) -> tuple[str, str, str]:
     return Path(problem.file).name, problem.key, f"{problem.message} ({problem.remedy})"
 
 
-# --- valid --------------------------------------------------------------------------------------------------------
-
-
 def test_merge__opens(merge: OpenScene) -> None:
     world = merge.world
     assert world.steps == 250
@@ -81,15 +78,9 @@ def test_scene__starts_use_the_lane_length_of_sumo(folder: Path) -> None:
     assert (x, y) == pytest.approx((20.0 - 2.3, -1.6))
 
 
-# --- files -----------------------------------------------------------------------------------------------------------
-
-
 def test_scene_file__a_missing_one_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "scene.tml").write_text("", encoding="utf-8")
     assert only(tmp_path) == ("scene.toml", "", "there is no such file (did you mean 'scene.tml'?)")
-
-
-# --- inconsistent names; many more are in tests/hostile and test_start_ranges.py -------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -178,9 +169,6 @@ def test_scene__all_problems_are_named_at_once(folder: Path) -> None:
     change(folder, "merge.rou.xml", "</routes>", '<vehicle id="third"><route edges="exitt"/></vehicle></routes>')
     keys = [each.key for each in problems(folder)]
     assert keys == ["vehicle third", "ego.vehicle", "goal.edge", "non_ego.lane"]
-
-
-# --- several files ----------------------------------------------------------------------------------------------------
 
 
 def test_scene__a_problem_of_the_document_hides_none_of_the_files(folder: Path) -> None:

@@ -60,9 +60,6 @@ def conflict(net: Net, route: str, stream: str) -> dict[str, Any] | None:
     return {name: getattr(tables.conflicts, name)[row] for name in Conflicts._fields}
 
 
-# --- zones -----------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("kind", ["priority", "traffic_light", "unregulated", "bare"])
 def test_zone__of_two_straight_streams_is_where_their_cars_need_room(crossings: dict[str, Net], kind: str) -> None:
     # northbound on x = 1.6, a route from y = -100; westbound traffic on y = 1.6 has its stop line at x = 7.2
@@ -139,9 +136,6 @@ def test_stream__begins_120_m_before_its_stop_line(build_net: Build) -> None:
     assert -120.0 < along_m.min() < -116.0, "over the joint at b, which has one way in and one way out"
 
 
-# --- who must yield --------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("kind", "route", "stream", "yields"),
     [
@@ -209,9 +203,6 @@ def test_merge__only_the_lane_that_is_joined_has_a_conflict(build_net: Build) ->
     assert (conflicts.right_m[1], conflicts.left_m[1]) == (-np.inf, np.inf)
 
 
-# --- stop lines and signals ------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("kind", "route", "control"),
     [
@@ -244,9 +235,6 @@ def test_signals__those_of_the_route_and_of_its_foes_are_columns(crossings: dict
         source, target = (net.getLane(lane).getEdge() for lane in tables.stream_lanes[stream])
         (link,) = source.getConnections(target)
         assert tables.signal_links[column] == ("c", link.getTLLinkIndex())
-
-
-# --- every net -------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kind", ["priority", "allway_stop", "bare", "lefthand"])

@@ -144,9 +144,6 @@ def test_mistake__is_named_with_its_place_and_remedy(write: Write, content: str,
     assert problem(write(TYPE_AND_ROUTE + content)).startswith(expected)
 
 
-# --- trips, distributions, stops ----------------------------------------------------------------------------------
-
-
 def test_trip__is_kept_until_its_route_is_found(write: Write) -> None:
     routes = read_route_file(write('<trip id="t" from="a" to="d" via="b c" depart="0:01:30"/>'))
     assert routes.vehicles["t"].trip == ("a", "b", "c", "d")
@@ -229,9 +226,6 @@ def test_file__what_only_draws_or_records_is_left_out(write: Write) -> None:
 def test_file__each_kind_of_refused_element_is_one_problem(write: Write) -> None:
     boxes = '<container id="p" depart="0"/><container id="q" depart="0"/>'
     assert problem(write(boxes)) == "container: containers are not supported (2 times) (remove these elements)"
-
-
-# --- the window and the density of a game -------------------------------------------------------------------------
 
 
 @given(

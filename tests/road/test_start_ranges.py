@@ -76,9 +76,6 @@ def games(scene: OpenScene, count: int = 60) -> list[InitialState]:
     return [drawn(scene, "game", game) for game in range(count)]
 
 
-# --- where routes meet -----------------------------------------------------------------------------------------------
-
-
 def test_meeting__of_a_crossing_is_where_the_ways_cross() -> None:
     found = meeting(straight(0.0), straight(np.pi / 2.0, x0=30.0, y0=-20.0))
     assert found is not None
@@ -99,9 +96,6 @@ def test_meeting__of_a_merge_is_where_the_ways_have_come_together() -> None:
 @pytest.mark.parametrize("other", [straight(0.0, y0=5.0), straight(np.pi / 2.0, x0=79.0, y0=-20.0)])
 def test_meeting__of_ways_that_do_not_meet_before_their_goals_is_none(other: object) -> None:
     assert meeting(straight(0.0), other) is None  # type: ignore[arg-type]
-
-
-# --- timed starts ----------------------------------------------------------------------------------------------------
 
 
 def test_arrival__by_hand() -> None:
@@ -137,9 +131,6 @@ def test_arrival__works_with_an_ego_along_its_route(write: Write) -> None:
         assert -1.1 <= other_s - ego_s <= 1.1
 
 
-# --- starts along the route ------------------------------------------------------------------------------------------
-
-
 def test_route_m__reaches_over_the_edges_of_the_route(write: Write) -> None:
     scene = open_scene(write(ego="route_m = [20.0, 120.0]", non_ego="route_m = [10.0, 30.0]"))
     assert scene.places[0].place == OnLine((20.0, 120.0))
@@ -150,9 +141,6 @@ def test_route_m__reaches_over_the_edges_of_the_route(write: Write) -> None:
         assert start.x_m[0] == pytest.approx(start.position_m[0] - 2.3, abs=0.05)
         assert start.y_m[1] == pytest.approx(start.position_m[1] - 2.3, abs=0.05)
         assert start.heading_rad == pytest.approx([0.0, np.pi / 2.0], abs=0.01)
-
-
-# --- goals -----------------------------------------------------------------------------------------------------------
 
 
 def test_goals__each_player_has_its_own(write: Write) -> None:
@@ -176,9 +164,6 @@ def test_goals__one_for_both_may_stand_beside_none(write: Write) -> None:
     file.write_text(shared + text, encoding="utf-8")
     goals_m = open_scene(folder).world.road.routes.goal_m
     assert goals_m[0] == goals_m[1]
-
-
-# --- what is impossible ----------------------------------------------------------------------------------------------
 
 
 NEAR = "route_m = [0.0, 5.0]"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import subprocess
 from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
@@ -12,7 +13,7 @@ import platformdirs
 import pytest
 
 from harness.environments.arena import Arena, Seat
-from harness.errors import SimulationError, UsageError
+from harness.errors import UsageError
 from harness.game.observation_layout import LAYOUT, in_units
 from harness.game.seeding import generator_of
 from harness.road.demand import warm_up
@@ -176,9 +177,7 @@ def test_stop__goes_on_for_the_rest_of_its_time(tmp_path: Path) -> None:
 
 
 def test_warm_up__that_sumo_can_not_run_is_named(scene: OpenScene, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(options: Sequence[str], folder: Path) -> None:
-        raise SimulationError("SUMO failed in the warm-up: out of order")
-
-    monkeypatch.setattr(warm_up, "_run_sumo", fail)
+    failed = subprocess.CompletedProcess([], 1, stderr="out of order")
+    monkeypatch.setattr(warm_up, "run_program", lambda *_: failed)
     with pytest.raises(UsageError, match=r"scene.toml: warm_up_s: SUMO failed in the warm-up: out of order"):
         check_loads(scene)

@@ -50,13 +50,14 @@ def with_places_in_metres(person: Departure, net: Net) -> Departure:
 
 def walk_problems(person: Departure, edges: Sequence[Edge]) -> Iterator[tuple[str, str]]:
     """Message and remedy for each reason why SUMO can't move a person along edges."""
-    pavements = [lane_on_foot(edge) for edge in edges]
-    for edge, lane in zip(edges, pavements, strict=True):
-        if lane is None:
+    lanes: list[Lane] = []
+    for edge in edges:
+        allowed = [lane for lane in edge.getLanes() if lane.allows("pedestrian")]
+        if not allowed:
             message = f"walks on edge {edge.getID()!r}, none of whose lanes allows pedestrians"
             yield message, "choose other edges, or allow pedestrians on a lane"
             return
-    lanes = [lane for lane in pavements if lane is not None]
+        lanes.append(allowed[0])  # on which SUMO's persons walk
     courses = [course for course in (_course(edges, True), _course(edges, False)) if course is not None]
     if not courses:
         yield "consecutive edges of its walk do not meet", "correct the walk's edges"
@@ -72,11 +73,6 @@ def walk_problems(person: Departure, edges: Sequence[Edge]) -> Iterator[tuple[st
     for name, place, edge in (("departPos", person.position, edges[0]), ("arrivalPos", person.arrival[1], edges[-1])):
         if place not in PLACES and abs(number_of(place)) > edge.getLength():
             yield f"its {name} {place} lies beyond the edge's end", f"give up to {edge.getLength():g} m"
-
-
-def lane_on_foot(edge: Edge) -> Lane | None:
-    """The lane of an edge on which SUMO's persons walk; None if none allows them."""
-    return next((lane for lane in edge.getLanes() if lane.allows("pedestrian")), None)
 
 
 def _course(edges: Sequence[Edge], forwards: bool) -> list[bool] | None:
@@ -95,11 +91,8 @@ def _jumps(lanes: Sequence[Lane], course: Sequence[bool]) -> Iterator[tuple[floa
     first."""
     for k, (lane, following) in enumerate(pairwise(lanes)):
         ahead, ahead_then = course[k], course[k + 1]
-        if ahead == ahead_then and _is_connected(*((lane, following) if ahead else (following, lane))):
+        first, second = (lane, following) if ahead else (following, lane)
+        if ahead == ahead_then and any(link.getToLane() is second for link in first.getOutgoing()):
             continue
         leaves, enters = lane_line(lane)[-1 if ahead else 0], lane_line(following)[0 if ahead_then else -1]
         yield float(np.hypot(*(enters - leaves))), k
-
-
-def _is_connected(lane: Lane, following: Lane) -> bool:
-    return any(link.getToLane() is following for link in lane.getOutgoing())

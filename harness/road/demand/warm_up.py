@@ -110,19 +110,15 @@ def _run(
         root.extend(traveller_element(each, each.name, each.depart_s) for each in departures)
         ElementTree.ElementTree(root).write(folder / "vehicles.rou.xml", encoding="utf-8", xml_declaration=True)
         files = ("--net-file", str(net_file), "--route-files", "types.rou.xml,vehicles.rou.xml")
-        _run_sumo([*files, *options, "--seed", str(seed_of("warm-up", k) % 2**31)], folder)
+        run = run_program("sumo", [*files, *options, "--seed", str(seed_of("warm-up", k) % 2**31)], folder, _PATIENCE_S)
+        if run is None:
+            raise SimulationError(f"SUMO did not finish the warm-up within {_PATIENCE_S:.0f} s")
+        if run.returncode:
+            raise SimulationError(f"SUMO failed in the warm-up: {run.stderr.strip()[-300:]}")
         try:
             return _vehicles(folder, {each.name: each for each in departures}, routes, options)
         except (UsageError, KeyError, ValueError, IndexError) as error:
             raise SimulationError(f"SUMO's state after the warm-up could not be read: {error!r}") from error
-
-
-def _run_sumo(options: Sequence[str], folder: Path) -> None:
-    run = run_program("sumo", options, folder, _PATIENCE_S)
-    if run is None:
-        raise SimulationError(f"SUMO did not finish the warm-up within {_PATIENCE_S:.0f} s")
-    if run.returncode:
-        raise SimulationError(f"SUMO failed in the warm-up: {run.stderr.strip()[-300:]}")
 
 
 def _vehicles(
