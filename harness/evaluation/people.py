@@ -57,8 +57,10 @@ def judged_outcomes(games: pd.DataFrame) -> pd.Series:
 
 def outcomes_of_people(games: pd.DataFrame) -> pd.Series:
     """The outcome of the first person that took part in each game; empty without one."""
-    outcomes = of_people(games, "outcome").fillna("")
-    return outcomes.mask(outcomes == "").bfill(axis=1).iloc[:, 0].fillna("")
+    first, *others = (outcomes.fillna("") for _, outcomes in of_people(games, "outcome").items())
+    for each in others:
+        first = first.where(first != "", each)
+    return first
 
 
 def judged(game: Mapping[str, Any]) -> tuple[str, str]:
