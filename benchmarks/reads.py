@@ -21,10 +21,9 @@ from benchmarks.bare_sumo import Placement, place_and_step, record_placements
 from benchmarks.games import GAMES, CoastingGames
 from benchmarks.traffic import write_scene
 from harness.game.arrays import FloatArray
-from harness.game.near_players import NearSearch
 from harness.game.state import NOTICED_M
 from harness.road.scene.open_scene import open_scene
-from harness.sumo.vehicle_reads import DIRECT, read_near, string_record
+from harness.sumo.vehicle_reads import DIRECT, NearSearch, read_near, string_record
 
 _STEPS = 60  # the players have not met any vehicle by then, and no vehicle has left
 _NEAREST = 17  # as many vehicles of a game as are near its players, of 50

@@ -37,8 +37,7 @@ from harness.game.observation_layout import SIZE
 from harness.game.outcome import Outcome
 from harness.game.quantities import Quantities
 from harness.game.sanity_checks import check_observation, check_step, checked_decisions, slack_m
-from harness.game.state import State
-from harness.game.terminations import terminations
+from harness.game.state import State, terminations
 from harness.game.traffic_rules import since_change_s
 from harness.game.walking import walk
 from harness.road.demand.route_file import Departure
@@ -144,7 +143,7 @@ class Arena(LiveSimulation):
                 seat.driver.reset(games[plays[games]])
         quantities = self.first_quantities(games)
         observation = self.observation[games] = observe(quantities)
-        self._road_steering_rad[games] = quantities.road_steering_rad
+        self._road_steering_rad[games] = quantities.along.road_steering_rad
         check_observation(observation, games, self.state.step)
 
     def reload(self, seed: int) -> None:
@@ -249,7 +248,7 @@ class Arena(LiveSimulation):
 
     def _observe(self, quantities: Quantities) -> None:
         """Observe, and keep what the next decisions need: the steering that follows the road."""
-        self.observation, self._road_steering_rad = observe(quantities), quantities.road_steering_rad
+        self.observation, self._road_steering_rad = observe(quantities), quantities.along.road_steering_rad
 
     # --- observations ------------------------------------------------------------------------------------
 

@@ -108,14 +108,9 @@ def _reach(box: Box, cosine: float, sine: float) -> tuple[float, float]:
 
 
 @compiled
-def box_segment_distance(box: Box, segment: FloatArray) -> float:
-    """Distance (m) of a box to a segment [2, 2] (start and end, x and y); 0 if they touch."""
-    return _box_segment_distance(box, (cos(box.heading_rad), sin(box.heading_rad)), segment, inf)
-
-
-@compiled
 def _box_segment_distance(box: Box, direction: tuple[float, float], segment: FloatArray, limit_m: float) -> float:
-    """The distance if it is below the limit, else a value not below it; `direction` is that of the heading."""
+    """Distance (m) of a box to a segment [2, 2] (start and end, x and y); 0 if they touch. If not below the limit,
+    any value that is not. `direction` is the cosine and sine of the heading."""
     cosine, sine = direction
     dx, dy = segment[0, 0] - box.x_m, segment[0, 1] - box.y_m
     u0, v0 = dx * cosine + dy * sine, dy * cosine - dx * sine

@@ -187,16 +187,6 @@ def unseen_behind_m(sight: Sight, draw: float) -> float:
     return sight.unseen_behind_m if draw < sight.no_blind_spot_check_share else -np.inf
 
 
-def draw_delay_steps(reaction: Reaction, step_s: float, generator: np.random.Generator) -> int:
-    """Draw a player's reaction delay for one game, in steps."""
-    return round(generator.uniform(*reaction.delay_s) / step_s)
-
-
-def draw_noticed_m(sight: Sight, generator: np.random.Generator) -> float:
-    """Draw the distance within which road users are noticed in one game; inf: no failure to see."""
-    return sight.noticed_within_m if generator.random() < sight.looked_but_failed_to_see_share else np.inf
-
-
 def draw_estimation_errors(sight: Sight, steps: int, step_s: float, generator: np.random.Generator) -> FloatArray:
     """[T, 2] errors of estimated distances (share) and closing speeds (per second of distance) for T = `steps`.
 

@@ -16,16 +16,13 @@ from harness.game.arrays import BoolArray, FloatArray
 from harness.game.human_factors import (
     NO_LIMITS,
     ActuatorShares,
-    Attention,
     HumanFactors,
     Lapses,
     Limits,
     Reaction,
     Sight,
-    draw_delay_steps,
     draw_estimation_errors,
     draw_lapses,
-    draw_noticed_m,
     unseen_behind_m,
 )
 from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles
@@ -81,14 +78,6 @@ class InitialState:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Conditions:
-    """The ranges of what differs from game to game beside the players."""
-
-    friction: tuple[float, float]
-    limit_share: tuple[float, float] = (1.0, 1.0)
-
-
-@dataclass(frozen=True, kw_only=True)
 class StartDistribution:
     """The distribution of initial states: start ranges, lengths, top speeds and probabilities of taking part, each [P].
 
@@ -107,51 +96,48 @@ class StartDistribution:
     steps: int
     step_s: float
     routes: Routes
-    conditions: Conditions
+    friction: tuple[float, float]
+    limit_share: tuple[float, float] = (1.0, 1.0)
     along_route_share: float = 0.0
     meet_in_place: bool = False
     obstacles: Obstacles = NO_OBSTACLES
 
-    @cached_property
-    def no_lapses(self) -> Lapses:
-        """The lapses of a driver without any: the same arrays in every game, since they are only read."""
-        return Lapses.none(self.steps)
 
-
-def draw_initial_state(start_distribution: StartDistribution, *parts: str | int) -> InitialState:
+def draw_initial_state(starts: StartDistribution, *parts: str | int) -> InitialState:
     """Draw the initial state of one game, with seeds hashed from the named parts."""
     generator = generator_of(*parts, "start")
-    players = range(len(start_distribution.places))
+    players = range(len(starts.places))
     draws = iter(generator.random(4 * len(players)).tolist())  # the same numbers as drawn one by one
     poses: list[tuple[float, ...]] = []
-    for place, length in zip(start_distribution.places, start_distribution.length_m.tolist(), strict=True):
+    for place, length in zip(starts.places, starts.length_m.tolist(), strict=True):
         share, speed = next(draws), between(place.speed_mps, next(draws))
         ego_mps, ego_m = poses[0][-2:] if poses else (speed, 0.0)
         position = place.position_m(share, speed, ego_m, ego_mps)
         poses.append((*place.pose(position, length), speed, position))
-    present = _present(draws, start_distribution.present_share)
+    present = _present(draws, starts.present_share)
     member = [
-        0 if len(shares) == 1 else draw_member(shares, player, *parts)
-        for player, shares in enumerate(start_distribution.shares)
+        0 if len(shares) == 1 else draw_member(shares, player, *parts) for player, shares in enumerate(starts.shares)
     ]
-    human_factors = [start_distribution.human_factors[player][member[player]] for player in players]
+    human_factors = [starts.human_factors[player][member[player]] for player in players]
     unseen = [unseen_behind_m(each.sight, next(draws)) for each in human_factors]
-    limits = [_limits(each, start_distribution, player, *parts) for player, each in enumerate(human_factors)]
-    lapses = [
-        _lapses(human_factors[player].attention, start_distribution, player, limits[player].delay_steps, *parts)
-        for player in players
-    ]
+    limits = [_limits(each, starts, player, *parts) for player, each in enumerate(human_factors)]
+    lapses = [Lapses.none(starts.steps)] * len(players)
+    for player, (each, limit) in enumerate(zip(human_factors, limits, strict=True)):
+        if each.attention is not None:
+            of_player = generator_of(*parts, "attention", player)
+            drawn = draw_lapses(each.attention, starts.steps, starts.step_s, of_player)
+            lapses[player] = drawn.with_reaction_delay(limit.delay_steps) if limit.delay_steps else drawn
     x, y, heading, speeds, positions = np.array(poses).T
-    stations = positions - 0.5 * start_distribution.length_m
-    if start_distribution.along_route_share and not (start_distribution.meet_in_place and sum(present) > 1):
+    stations = positions - 0.5 * starts.length_m
+    if starts.along_route_share and not (starts.meet_in_place and sum(present) > 1):
         along = draw_along_route(
-            start_distribution.routes,
+            starts.routes,
             generator_of(*parts, "along route"),
-            length_m=start_distribution.length_m,
-            max_speed_mps=start_distribution.max_speed_mps,
+            length_m=starts.length_m,
+            max_speed_mps=starts.max_speed_mps,
             present=np.array(present),
-            share=start_distribution.along_route_share,
-            obstacles=start_distribution.obstacles.boxes(*parts),
+            share=starts.along_route_share,
+            obstacles=starts.obstacles.boxes(*parts),
         )
         if along is not None:
             x, y, heading, speeds, stations = along
@@ -164,13 +150,13 @@ def draw_initial_state(start_distribution: StartDistribution, *parts: str | int)
         position_m=positions,
         station_m=stations,
         present=np.array(present),
-        lazy_noise=LazyNoise(generator, (len(players), start_distribution.steps, 2)),
+        lazy_noise=LazyNoise(generator, (len(players), starts.steps, 2)),
         lapses=tuple(lapses),
         unseen_behind_m=np.array(unseen),
         limits=tuple(limits),
         member=tuple(member),
-        friction=_varied(start_distribution.conditions.friction, "friction", *parts),
-        limit_share=_varied(start_distribution.conditions.limit_share, "speed limit", *parts),
+        friction=_varied(starts.friction, "friction", *parts),
+        limit_share=_varied(starts.limit_share, "speed limit", *parts),
         signal_place=float(generator_of(*parts, "signals").random()),
         parts=parts,
     )
@@ -204,20 +190,7 @@ def member_in_episode(shares: Sequence[float], player: int, seed: int, episode: 
     return draw_member(shares, player, *parts_of(seed, episode))
 
 
-def _lapses(
-    attention: Attention | None, start_distribution: StartDistribution, player: int, delay_steps: int, *parts: str | int
-) -> Lapses:
-    if attention is None:
-        return start_distribution.no_lapses
-    lapses = draw_lapses(
-        attention, start_distribution.steps, start_distribution.step_s, generator_of(*parts, "attention", player)
-    )
-    return lapses.with_reaction_delay(delay_steps) if delay_steps else lapses
-
-
-def _limits(
-    human_factors: HumanFactors, start_distribution: StartDistribution, player: int, *parts: str | int
-) -> Limits:
+def _limits(human_factors: HumanFactors, starts: StartDistribution, player: int, *parts: str | int) -> Limits:
     """The limits of a player. Each limit has its own generator, which is made only if the limit exists."""
     reaction, sight, shares = human_factors.reaction, human_factors.sight, human_factors.actuator_shares
     if (reaction, sight, shares) == _UNLIMITED:  # common, and much faster than the rest
@@ -226,16 +199,16 @@ def _limits(
     def generator(name: str) -> np.random.Generator:
         return generator_of(*parts, name, player)
 
-    step_s = start_distribution.step_s
-    delay_steps = draw_delay_steps(reaction, step_s, generator("reaction")) if any(reaction.delay_s) else 0
-    noticed_m = draw_noticed_m(sight, generator("missing")) if sight.looked_but_failed_to_see_share else np.inf
-    exact = sight.distance_error == sight.closing_error_per_s == 0.0
+    delay_s = generator("reaction").uniform(*reaction.delay_s) if any(reaction.delay_s) else 0.0
+    failing = sight.looked_but_failed_to_see_share
+    fails_to_see = bool(failing) and generator("missing").random() < failing
+    errors = None
+    if sight.distance_error or sight.closing_error_per_s:
+        errors = draw_estimation_errors(sight, starts.steps, starts.step_s, generator("sight"))
     return Limits(
-        delay_steps=delay_steps,
-        sight_m=min(sight.range_m, noticed_m),
+        delay_steps=round(delay_s / starts.step_s),
+        sight_m=min(sight.range_m, sight.noticed_within_m) if fails_to_see else sight.range_m,
         opening_rad=float(np.deg2rad(sight.opening_deg)),
-        estimation_errors=(
-            None if exact else draw_estimation_errors(sight, start_distribution.steps, step_s, generator("sight"))
-        ),
+        estimation_errors=errors,
         actuator_shares=(shares.throttle_share, shares.braking_share, shares.steering_share),
     )

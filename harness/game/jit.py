@@ -8,7 +8,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import logging
-import threading
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
@@ -74,29 +73,21 @@ def _in_turn(work: Callable[..., object], folder: Path) -> Callable[..., object]
     return in_turn
 
 
-_threads = threading.RLock()
-_depth = 0  # compiling a function may compile the functions that it calls
-
-
 @contextlib.contextmanager
 def _turn(folder: Path) -> Iterator[None]:
     """Only this thread of this process compiles functions with this folder of the cache, and functions that they call,
     in the block. The turn of a process that dies ends with it."""
-    global _depth
-    with _threads, contextlib.ExitStack() as stack:
-        if _depth == 0:
-            # a file system without locks is no error; a lock made of a file's existence would outlive its process
-            with contextlib.suppress(OSError, NotImplementedError):
-                stack.enter_context(_lock(folder))
-        _depth += 1
-        try:
-            yield
-        finally:
-            _depth -= 1
+    with contextlib.ExitStack() as stack:
+        # a file system without locks is no error; a lock made of a file's existence would outlive its process
+        with contextlib.suppress(OSError, NotImplementedError):
+            stack.enter_context(_lock(folder))
+        yield
 
 
+@cache
 def _lock(folder: Path) -> contextlib.AbstractContextManager[object]:
-    """The lock of all processes that use a folder of the cache. Entering it raises OSError if it can't be written."""
+    """The lock of all processes that use a folder of the cache. A thread may enter it again: compiling a function may
+    compile those that it calls. Raises OSError if the folder can't be written."""
     from filelock import FileLock  # imports asyncio and sqlite3: only for processes that run compiled code
 
     folder.mkdir(parents=True, exist_ok=True)

@@ -92,6 +92,7 @@ class Conflicts(NamedTuple):
 SAMPLE = ("x_m", "y_m", "cos", "sin", "half_width_m", "half_spacing_m", "along_m")
 """The columns of a stream's samples: point and direction of its centre line, half its width, half the length of stream
 that the sample stands for, and the place along the stream."""
+X_M, Y_M, COS, SIN, HALF_WIDTH_M, HALF_SPACING_M, ALONG_M = range(len(SAMPLE))
 
 
 class Streams(NamedTuple):
@@ -164,14 +165,14 @@ def _grid(samples: FloatArray, stream: IntArray) -> tuple[FloatArray, IntArray, 
     """The grid of samples: each sample is in every cell that touches the box around the length it stands for."""
     if not len(stream):
         return np.zeros(2), np.zeros((1, 2), dtype=np.int64), np.zeros(0, dtype=np.int64)
-    points, reach_m = samples[:, :2], np.hypot(samples[:, 4], samples[:, 5])[:, None]
+    points, reach_m = samples[:, :2], np.hypot(samples[:, HALF_WIDTH_M], samples[:, HALF_SPACING_M])[:, None]
     origin_m = (points - reach_m).min(0)
     low = ((points - reach_m - origin_m) // CELL_M).astype(np.int64)
     high = ((points + reach_m - origin_m) // CELL_M).astype(np.int64) + 1
     across, up = high.max(0)
     pairs = [
         (x * up + y, row)
-        for row in np.lexsort((samples[:, 6], stream)).tolist()
+        for row in np.lexsort((samples[:, ALONG_M], stream)).tolist()
         for x in range(low[row, 0], high[row, 0])
         for y in range(low[row, 1], high[row, 1])
     ]

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from harness.game import junctions
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.jit import compiled
 from harness.game.junctions import CELL_M, Conflicts, Signal, Streams
@@ -44,29 +45,11 @@ class Meetings(NamedTuple):
     # player moves up to its place inside the junction, before which it can stop in comfort
     must_yield: BoolArray  # the player, to the body
 
-    @classmethod
-    @lru_cache(maxsize=64)
-    def none(cls, shape: tuple[int, ...]) -> Meetings:
-        """No conflict with any of the bodies, [G, P, B]. The same arrays for equal shapes: they are only read."""
-        return cls.of(np.full(shape, -1), np.full((5, *shape), np.inf), np.zeros(shape, dtype=bool))
 
-    @classmethod
-    def of(cls, conflict: IntArray, numbers: FloatArray, must_yield: BoolArray) -> Meetings:
-        """The record of the columns that `meetings` returns."""
-        own_m, other_m, own_s, other_s, gap_s = numbers
-        return cls(conflict, own_m, other_m, own_s, other_s, gap_s, must_yield)
-
-
-def least_gap_s(met: Meetings) -> FloatArray:
-    """[G, P] the least `gap_s` of zones that the player reaches within `HORIZON_S`; inf without one."""
-    return np.where(met.own_s < HORIZON_S, met.gap_s, np.inf).min(-1, initial=np.inf)
-
-
-def entered_before_s(met: Meetings, advanced_m: FloatArray) -> FloatArray:
-    """[G, P] the least `other_s` of the bodies with priority whose zone the player's front entered in this step, in
-    which it advanced by `advanced_m` [G, P]; inf without one."""
-    enters = (met.own_m <= 0.0) & (met.own_m + advanced_m[..., None] > 0.0)
-    return np.where(enters & met.must_yield, met.other_s, np.inf).min(-1, initial=np.inf)
+@lru_cache(maxsize=64)
+def no_meetings(shape: tuple[int, ...]) -> Meetings:
+    """No conflict with any of the bodies, [G, P, B]. The same arrays for equal shapes: they are only read."""
+    return Meetings._make((np.full(shape, -1), *np.full((5, *shape), np.inf), np.zeros(shape, dtype=bool)))
 
 
 class _Body(NamedTuple):
@@ -138,7 +121,12 @@ def _meeting(
     other_end_m = other_m + conflicts[found, _LENGTH_M] + 2.0 * body.half_m
     own = _passage_s(own_m, own_end_m, player.speed_mps)
     other = _passage_s(other_m, other_end_m, body.speed_mps)
-    gap_s = np.inf if _moves_up(found, own_m, player.speed_mps, conflicts) else _gap_s(own, other)
+    waits_inside = conflicts[found, _WAIT_M] > conflicts[found, _STOP_M]
+    moves_up = waits_inside and player.speed_mps**2 < 2.0 * COMFORTABLE_MPS2 * own_m  # it can stop in comfort
+    if moves_up or own[0] == np.inf or other[0] == np.inf:
+        gap_s = np.inf
+    else:
+        gap_s = max(other[0] - own[1], own[0] - other[1], 0.0)
     # a signal counts for a side that has not passed its stop line
     own_signal, other_signal = _OFF, _OFF
     if conflicts[found, _OWN_LINK] >= 0 and player.front_m <= conflicts[found, _STOP_M] and len(signals):
@@ -168,16 +156,17 @@ def streams_at(pose: tuple[float, float, float], streams: Streams, in_streams: I
     for place in range(streams.first[column, line], streams.first[column, line + 1]):
         k = streams.rows[place]
         sample = streams.samples[k]
-        at_x, at_y, along_x, along_y = sample[0], sample[1], sample[2], sample[3]
-        dx, dy = x_m - at_x, y_m - at_y
+        along_x, along_y = sample[junctions.COS], sample[junctions.SIN]
+        dx, dy = x_m - sample[junctions.X_M], y_m - sample[junctions.Y_M]
         u, v = dx * along_x + dy * along_y, dy * along_x - dx * along_y
-        if abs(v) > sample[4] or abs(u) > sample[5] or along_x * cosine + along_y * sine < _MOST_TURNED:
+        outside = abs(v) > sample[junctions.HALF_WIDTH_M] or abs(u) > sample[junctions.HALF_SPACING_M]
+        if outside or along_x * cosine + along_y * sine < _MOST_TURNED:
             continue
         again = count > 0 and in_streams[count - 1] == streams.stream[k]
         if not again or u * u + v * v < nearest2:
             count += 0 if again else 1
             in_streams[count - 1], nearest2 = streams.stream[k], u * u + v * v
-            along_m[streams.stream[k]] = sample[6] + u
+            along_m[streams.stream[k]] = sample[junctions.ALONG_M] + u
             beside_m[count - 1] = abs(v)
             least_m = min(least_m, abs(v))
     near = 0
@@ -215,20 +204,6 @@ def _passage_s(begin_m: float, end_m: float, speed_mps: float) -> tuple[float, f
     moves = speed_mps > STANDING_MPS
     enters = 0.0 if begin_m <= 0.0 else (begin_m / speed_mps if moves else np.inf)
     return enters, (max(end_m, 0.0) / speed_mps if moves else np.inf)
-
-
-@compiled
-def _gap_s(own: tuple[float, float], other: tuple[float, float]) -> float:
-    """The time between two passages; 0 if they overlap, inf if one of the two never begins."""
-    if own[0] == np.inf or other[0] == np.inf:
-        return np.inf
-    return max(other[0] - own[1], own[0] - other[1], 0.0)
-
-
-@compiled
-def _moves_up(c: int, own_m: float, speed_mps: float, conflicts: FloatArray) -> bool:
-    """Whether a player waits inside the junction in conflict `c`, and can stop in comfort before the zone."""
-    return conflicts[c, _WAIT_M] > conflicts[c, _STOP_M] and speed_mps**2 < 2.0 * COMFORTABLE_MPS2 * own_m
 
 
 @compiled

@@ -23,9 +23,8 @@ from harness.game.junctions import Control, Signal, StopLines
 from harness.game.meetings import Meetings
 from harness.game.observation_layout import BEHIND, COMPRESSED, ENTRIES, FIRST_OTHER, OTHER, OTHERS, OWN, SCALE, SIZE
 from harness.game.quantities import Quantities
-from harness.game.road import AHEAD_M, Along, Routes
+from harness.game.road import AHEAD_M, Routes
 from harness.game.route_coordinates import OnRoute, half_extents_m, on_route, point_along_route, row_ahead
-from harness.game.sight import nothing_hidden
 from harness.game.state import Bodies
 
 _EDGES = np.concatenate(([-2.5], 0.5 * (AHEAD_M[1:] + AHEAD_M[:-1]), [60.0]))  # bins of road around AHEAD_M
@@ -57,11 +56,15 @@ class _Players(NamedTuple):
 
 
 class _Views(NamedTuple):
-    """What the road, the rules and the cars add to that."""
+    """What the road, the rules and the cars add to that: [G, P] unless noted."""
 
-    offset_m: FloatArray  # [G, P] from the route's line
-    next_line: IntArray  # [G, P] row of the next stop line
-    posted_mps: FloatArray  # [G, P]
+    offset_m: FloatArray  # from the route's line
+    next_line: IntArray  # row of the next stop line
+    posted_mps: FloatArray
+    speed_limit_mps: FloatArray
+    road_steering_rad: FloatArray
+    lane_end_m: FloatArray
+    goal_m: FloatArray
     hidden: BoolArray  # [G, P, B]
     max_steering_rad: FloatArray  # [P]
     length_m: FloatArray  # [P]
@@ -80,11 +83,6 @@ class _Eye(NamedTuple):
     cosine: float  # of the heading
     sine: float
     speed_mps: float
-    acceleration_mps2: float
-    steering_rad: float
-    max_steering_rad: float
-    posted_mps: float
-    next_line: int
     length_m: float
     width_m: float
     unseen_behind_m: float
@@ -114,23 +112,23 @@ _columns = attrgetter(*_Players._fields)  # plain tuples: numba takes them apart
 
 def observe(q: Quantities) -> FloatArray:
     """[G, P, SIZE] float32 in [-1, 1]: the players' observations; zeros for players that are not present."""
-    world, shape = q.world, (*q.state.present.shape, q.bodies.present.shape[1])
+    world, rules, along = q.world, q.rules, q.along
     views = (  # the columns of `_Views`
-        *(q.lateral_offset_m, q.rules.next_line, q.rules.posted_mps),
-        q.hidden if world.hiding.anything else nothing_hidden(shape),
+        *(q.lateral_offset_m, rules.next_line, rules.posted_mps),
+        *(along.speed_limit_mps, along.road_steering_rad, along.lane_end_m, along.goal_m, q.hidden),
         *(world.actuators.max_steering_rad, world.length_m, world.width_m),
     )
-    road = (tuple(world.road.routes), tuple(q.along), tuple(world.right_of_way.stop_lines), tuple(q.meetings))
-    return _observe((_columns(q.state), views, tuple(q.bodies), *road))
+    records = (q.bodies, world.road.routes, world.right_of_way.stop_lines, q.meetings)
+    return _observe((_columns(q.state), views, *map(tuple, records)))
 
 
 @compiled
 def _observe(tables: tuple[tuple[Any, ...], ...]) -> FloatArray:
-    """One compiled pass over the columns of players, views, bodies, routes, the road at the players, stop lines and
-    meetings: several calls would cost more than their work. A record of arrays costs time at every call of a function
-    with a loop: the loops are here."""
+    """One compiled pass over the columns of players, views, bodies, routes, stop lines and meetings: several calls
+    would cost more than their work. A record of arrays costs time at every call of a function with a loop: the loops
+    are here."""
     players, views, bodies, routes = _Players(*tables[0]), _Views(*tables[1]), Bodies(*tables[2]), Routes(*tables[3])
-    along, stop_lines, meetings = Along(*tables[4]), StopLines(*tables[5]), Meetings(*tables[6])
+    stop_lines, meetings = StopLines(*tables[4]), Meetings(*tables[5])
     observation, view = np.zeros((*players.present.shape, SIZE), dtype=np.float32), np.empty(SIZE)
     count = bodies.present.shape[1]
     seen, urgency_s = np.empty(count, dtype=np.bool_), np.empty(count)
@@ -139,11 +137,17 @@ def _observe(tables: tuple[tuple[Any, ...], ...]) -> FloatArray:
             place = on_route(players.station_m[g, p], views.offset_m[g, p], p, routes)
             eye = _eye(players, views, place, (g, p))
             view[:] = 0.0
-            _see_own_motion(view, eye, along)
+            _see_own_motion(view, eye, players, views)
             _see_own_side(view, eye, routes)
             for k in range(_COUNT):
                 _see_road(view, k, eye, routes)
-            _see_stop_line(view, eye, stop_lines, (players.signals, players.signal_s))
+            if views.next_line[g, p] < 0:
+                view[OWN.stop_line_m] = np.inf
+            else:
+                _see_stop_line(view, eye, views.next_line[g, p], stop_lines)
+                link = stop_lines.link[views.next_line[g, p]]
+                if link >= 0:
+                    _see_signal(view, players.signals[g, link], players.signal_s[g, link])
             leader_m, leader_mps = np.inf, 0.0
             for b in range(count):
                 body = _body(bodies, meetings, (g, p, b))
@@ -186,11 +190,6 @@ def _eye(players: _Players, views: _Views, place: OnRoute, who: tuple[int, int])
         np.cos(heading_rad),
         np.sin(heading_rad),
         players.speed_mps[g, p],
-        players.acceleration_mps2[g, p],
-        players.steering_rad[g, p],
-        views.max_steering_rad[p],
-        views.posted_mps[g, p],
-        views.next_line[g, p],
         views.length_m[p],
         views.width_m[p],
         players.unseen_behind_m[g, p],
@@ -227,17 +226,17 @@ def _scaled(value: float, scale: float, compressed: bool) -> float:
 
 
 @inlined
-def _see_own_motion(view: FloatArray, eye: _Eye, along: Along) -> None:
+def _see_own_motion(view: FloatArray, eye: _Eye, players: _Players, views: _Views) -> None:
     """Write the entries of the own motion and of the road at the player."""
     g, p = eye.g, eye.p
     view[OWN.speed_mps] = eye.speed_mps
-    view[OWN.speed_limit_mps] = along.speed_limit_mps[g, p]
-    view[OWN.speed_over_limit] = eye.speed_mps / along.speed_limit_mps[g, p] - 1.0
-    view[OWN.over_posted_mps] = eye.speed_mps - eye.posted_mps
-    view[OWN.acceleration_mps2] = eye.acceleration_mps2
-    view[OWN.steering_rad] = eye.steering_rad / eye.max_steering_rad
-    view[OWN.road_steering_rad] = along.road_steering_rad[g, p] / eye.max_steering_rad
-    view[OWN.lane_end_m], view[OWN.goal_m] = along.lane_end_m[g, p], along.goal_m[g, p]
+    view[OWN.speed_limit_mps] = views.speed_limit_mps[g, p]
+    view[OWN.speed_over_limit] = eye.speed_mps / views.speed_limit_mps[g, p] - 1.0
+    view[OWN.over_posted_mps] = eye.speed_mps - views.posted_mps[g, p]
+    view[OWN.acceleration_mps2] = players.acceleration_mps2[g, p]
+    view[OWN.steering_rad] = players.steering_rad[g, p] / views.max_steering_rad[p]
+    view[OWN.road_steering_rad] = views.road_steering_rad[g, p] / views.max_steering_rad[p]
+    view[OWN.lane_end_m], view[OWN.goal_m] = views.lane_end_m[g, p], views.goal_m[g, p]
 
 
 @inlined
@@ -260,21 +259,21 @@ def _see_road(view: FloatArray, k: int, eye: _Eye, routes: Routes) -> None:
 
 
 @inlined
-def _see_stop_line(view: FloatArray, eye: _Eye, lines: StopLines, links: tuple[IntArray, FloatArray]) -> None:
-    """Write the entries of the next stop line, with the signals of links and the seconds since they changed [G, L]."""
-    if eye.next_line < 0:
-        view[OWN.stop_line_m] = np.inf
-        return
-    control, link = lines.control[eye.next_line], lines.link[eye.next_line]
-    view[OWN.stop_line_m] = lines.station_m[eye.next_line] - (eye.place.station_m + 0.5 * eye.length_m)
+def _see_stop_line(view: FloatArray, eye: _Eye, line: int, lines: StopLines) -> None:
+    """Write the entries of the next stop line, of a row of the table."""
+    control = lines.control[line]
+    view[OWN.stop_line_m] = lines.station_m[line] - (eye.place.station_m + 0.5 * eye.length_m)
     view[OWN.give_way] = 1.0 if control == Control.GIVE_WAY else 0.0
     view[OWN.stop_sign] = 1.0 if control in (Control.STOP, Control.ALL_WAY_STOP) else 0.0
-    if link >= 0:
-        signal = links[0][eye.g, link]
-        view[OWN.signal_green] = 1.0 if signal in (Signal.GREEN, Signal.GREEN_YIELDING) else 0.0
-        view[OWN.signal_yellow] = 1.0 if signal == Signal.YELLOW else 0.0
-        view[OWN.signal_red] = 1.0 if signal == Signal.RED else 0.0
-        view[OWN.signal_s] = links[1][eye.g, link]
+
+
+@compiled
+def _see_signal(view: FloatArray, signal: int, since_s: float) -> None:
+    """Write the entries of the signal of the next stop line."""
+    view[OWN.signal_green] = 1.0 if signal in (Signal.GREEN, Signal.GREEN_YIELDING) else 0.0
+    view[OWN.signal_yellow] = 1.0 if signal == Signal.YELLOW else 0.0
+    view[OWN.signal_red] = 1.0 if signal == Signal.RED else 0.0
+    view[OWN.signal_s] = since_s
 
 
 @compiled

@@ -9,14 +9,12 @@ terms as well: contact must be the worst of the distances.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from operator import attrgetter
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.fuzzy import FuzzyFunction
@@ -57,10 +55,11 @@ class Payoff:
 
     def _term_values(self, q: Quantities, player: int) -> FloatArray:
         """[T + 1, G] weighted values of the terms without the fuzzy ones, and their sum."""
-        quantities = np.empty((len(self._quantities), len(q.state.step)))
-        for row, quantity in enumerate(self._quantities):
-            quantities[row] = quantity(q)[:, player]
-        return _term_values(quantities, self._weights, q.world.step_s)
+        names, columns = self._columns
+        quantities = np.empty((len(names), len(q.state.step)))
+        for row, name in enumerate(names):
+            quantities[row] = attrgetter(name)(q)[:, player]
+        return _term_values(quantities, columns, q.world.step_s)
 
     def _fuzzy_values(self, q: Quantities, player: int) -> Iterator[FloatArray]:
         """[G] weighted value of each fuzzy term."""
@@ -68,28 +67,20 @@ class Payoff:
             yield self.alpha["human"] * weight * q.world.step_s * function(getattr(q, function.quantity)[:, player])
 
     @cached_property
-    def _quantities(self) -> list[Callable[[Quantities], NDArray[Any]]]:
-        """Getters of the quantities that the terms without the fuzzy ones use, each once."""
-        return [attrgetter(name) for name in self._quantity_names]
-
-    @cached_property
-    def _quantity_names(self) -> list[str]:
-        return list(dict.fromkeys(TERMS[each.name].quantity for each in self.terms))
-
-    @cached_property
-    def _weights(self) -> tuple[IntArray, IntArray, FloatArray, FloatArray, BoolArray]:
-        """[T] for each term without the fuzzy ones: row of its quantity, form, the form's parameter, weight times
-        alpha, whether it is a rate."""
-        terms = [TERMS[each.name] for each in self.terms]
-        parameters = [
-            float(term.outcome if each.parameter is None else each.parameter)
-            for term, each in zip(terms, self.terms, strict=True)
-        ]
-        weights = [self.alpha[term.group] * each.weight for term, each in zip(terms, self.terms, strict=True)]
-        rows = np.array([self._quantity_names.index(term.quantity) for term in terms], dtype=np.int64)
-        forms = np.array([int(term.form) for term in terms], dtype=np.int64)
-        rates = np.array([term.per_second for term in terms], dtype=bool)
-        return rows, forms, np.array(parameters, dtype=float), np.array(weights, dtype=float), rates
+    def _columns(self) -> tuple[list[str], tuple[IntArray, IntArray, FloatArray, FloatArray, BoolArray]]:
+        """The quantities of the terms without the fuzzy ones, each once, and [T] for each term: row of its quantity,
+        form, the form's parameter, weight times alpha, whether it is a rate."""
+        terms = [(each, TERMS[each.name]) for each in self.terms]
+        names = list(dict.fromkeys(term.quantity for _, term in terms))
+        parameters = [term.outcome if each.parameter is None else each.parameter for each, term in terms]
+        columns = (
+            np.array([names.index(term.quantity) for _, term in terms], dtype=np.int64),
+            np.array([int(term.form) for _, term in terms], dtype=np.int64),
+            np.array(parameters, dtype=float),
+            np.array([self.alpha[term.group] * each.weight for each, term in terms], dtype=float),
+            np.array([term.per_second for _, term in terms], dtype=bool),
+        )
+        return names, columns
 
 
 @compiled
@@ -98,7 +89,7 @@ def _term_values(
 ) -> FloatArray:
     """[T + 1, G] weighted values of T terms of quantities [Q, G], and their sum, added in the order of the terms.
 
-    `terms` are the columns of `Payoff._weights`.
+    `terms` are the columns of `Payoff._columns`.
     """
     row, form, parameter, weight, per_second = terms
     values = np.zeros((len(form) + 1, quantities.shape[1]))

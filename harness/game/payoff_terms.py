@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import partial
 from math import nan
 
 from harness.game.outcome import Outcome
@@ -51,7 +52,7 @@ class Term:
     meaning: str
     quantity: str
     form: Form
-    per_second: bool = False
+    per_second: bool = True
     parameter: str = ""
     """The name of the form's parameter, if a persona sets it: a limit in the quantity's unit."""
     outcome: Outcome = Outcome.RUNNING
@@ -60,168 +61,123 @@ class Term:
     """Of a term without parameter: a moment in words and the quantity in it, from which profiles compute its worth."""
 
 
-def _outcome_term(*, group: str, meaning: str, form: Form, outcome: Outcome) -> Term:
+def _ends(group: str, meaning: str, form: Form, outcome: Outcome) -> Term:
     return Term(
         group=group,
-        meaning=meaning,
+        meaning=f"{meaning}, once",
         quantity="state.outcome",
         form=form,
+        per_second=False,
         outcome=outcome,
         example=("once", float(outcome)),
     )
 
 
+_safety = partial(Term, group="safety")
+_operational = partial(Term, group="operational")
+_human = partial(Term, group="human")
+
 TERMS: Mapping[str, Term] = {
-    "collision": _outcome_term(
-        group="safety", meaning="touching a vehicle or person, once", form=Form.LOST, outcome=Outcome.COLLISION
-    ),
-    "rail": _outcome_term(
-        group="safety", meaning="touching the edge of the road, once", form=Form.LOST, outcome=Outcome.RAIL
-    ),
-    "clearance": Term(
-        group="safety",
+    "collision": _ends("safety", "touching a vehicle or person", Form.LOST, Outcome.COLLISION),
+    "rail": _ends("safety", "touching the edge of the road", Form.LOST, Outcome.RAIL),
+    "clearance": _safety(
         meaning="nearness to the nearest surface, rail or vehicle",
         quantity="clearance_m",
         form=Form.BELOW,
-        per_second=True,
         parameter="within_m",
     ),
-    "vehicle_clearance": Term(
-        group="safety",
-        meaning="nearness to the nearest vehicle",
-        quantity="vehicle_clearance_m",
-        form=Form.BELOW,
-        per_second=True,
-        parameter="within_m",
+    "vehicle_clearance": _safety(
+        meaning="nearness to the nearest vehicle", quantity="vehicle_clearance_m", form=Form.BELOW, parameter="within_m"
     ),
-    "time_gap": Term(
-        group="safety",
-        meaning="following closer than a time gap",
-        quantity="time_gap_s",
-        form=Form.BELOW,
-        per_second=True,
-        parameter="within_s",
+    "time_gap": _safety(
+        meaning="following closer than a time gap", quantity="time_gap_s", form=Form.BELOW, parameter="within_s"
     ),
-    "time_to_collision": Term(
-        group="safety",
+    "time_to_collision": _safety(
         meaning="being on a course to contact sooner than this",
         quantity="time_to_collision_s",
         form=Form.BELOW,
-        per_second=True,
         parameter="within_s",
     ),
-    "speed_over_limit": Term(
-        group="safety",
+    "speed_over_limit": _safety(
         meaning="speed over the limit, or over what a signal, a sign or priority permits, as a share of the limit",
         quantity="speed_over_permitted",
         form=Form.OVER,
-        per_second=True,
         example=("at 10 % over", 0.1),
     ),
-    "red_light": Term(
-        group="safety",
+    "red_light": _safety(
         meaning="passing a stop line on red, once, if the signal is red for at least this long",
         quantity="rules.passed_red_s",
         form=Form.FROM,
+        per_second=False,
         parameter="after_s",
     ),
-    "stop_sign": Term(
-        group="safety",
+    "stop_sign": _safety(
         meaning="passing a stop sign at this speed or faster, once",
         quantity="rules.passed_stop_sign_mps",
         form=Form.FROM,
+        per_second=False,
         parameter="from_mps",
     ),
-    "wrong_way": Term(
-        group="safety",
+    "wrong_way": _safety(
         meaning="being among oncoming lanes",
         quantity="along.wrong_way",
         form=Form.LESS,
-        per_second=True,
         example=("on the wrong side", 1.0),
     ),
-    "yield": Term(
-        group="safety",
+    "yield": _safety(
         meaning="entering the way of a vehicle with priority that is there sooner than this, once",
         quantity="entered_before_s",
         form=Form.BELOW,
+        per_second=False,
         parameter="within_s",
     ),
-    "gap": Term(
-        group="safety",
+    "gap": _safety(
         meaning="passing a crossing or a merge closer in time to another vehicle than this",
         quantity="gap_s",
         form=Form.BELOW,
-        per_second=True,
         parameter="within_s",
     ),
-    "goal": _outcome_term(
-        group="operational", meaning="reaching the goal, once", form=Form.GAINED, outcome=Outcome.GOAL
-    ),
-    "timeout": _outcome_term(
-        group="operational", meaning="not reaching the goal in time, once", form=Form.LOST, outcome=Outcome.TIMEOUT
-    ),
-    "progress": Term(
-        group="operational",
+    "goal": _ends("operational", "reaching the goal", Form.GAINED, Outcome.GOAL),
+    "timeout": _ends("operational", "not reaching the goal in time", Form.LOST, Outcome.TIMEOUT),
+    "progress": _operational(
         meaning="way along the route, per 100 m",
         quantity="advanced_m",
         form=Form.PER_100,
+        per_second=False,
         example=("for 100 m", 100.0),
     ),
-    "speed_under_limit": Term(
-        group="operational",
+    "speed_under_limit": _operational(
         meaning="speed under the limit, or under what a signal, a sign or priority permits, as a share of the limit",
         quantity="speed_over_permitted",
         form=Form.UNDER,
-        per_second=True,
         example=("at 10 % under", -0.1),
     ),
-    "lane_offset": Term(
-        group="operational",
+    "lane_offset": _operational(
         meaning="distance from the nearest lane's centre, m",
         quantity="lane_offset_m",
         form=Form.LESS,
-        per_second=True,
         example=("at 1 m", 1.0),
     ),
-    "acceleration": Term(
-        group="operational",
+    "acceleration": _operational(
         meaning="squared acceleration or braking, as a share of 10 m/s2",
         quantity="state.acceleration_mps2",
         form=Form.LESS_SQUARED,
-        per_second=True,
         example=("at 5 m/s²", 5.0),
     ),
-    "lateral_acceleration": Term(
-        group="operational",
+    "lateral_acceleration": _operational(
         meaning="squared lateral acceleration, as a share of 10 m/s2",
         quantity="lateral_acceleration_mps2",
         form=Form.LESS_SQUARED,
-        per_second=True,
         example=("at 3 m/s²", 3.0),
     ),
-    "on_carriageway": Term(
-        group="safety",
+    "on_carriageway": _safety(
         meaning="being on the carriageway, on foot",
         quantity="on_carriageway",
         form=Form.LESS,
-        per_second=True,
         example=("on the carriageway", 1.0),
     ),
-    "waiting": Term(
-        group="human",
-        meaning="standing still",
-        quantity="stands",
-        form=Form.LESS,
-        per_second=True,
-        example=("standing", 1.0),
-    ),
-    "time_pressure": Term(
-        group="human",
-        meaning="every second on the way",
-        quantity="state.speed_mps",
-        form=Form.ALWAYS,
-        per_second=True,
-        example=("always", 0.0),
+    "waiting": _human(meaning="standing still", quantity="stands", form=Form.LESS, example=("standing", 1.0)),
+    "time_pressure": _human(
+        meaning="every second on the way", quantity="state.speed_mps", form=Form.ALWAYS, example=("always", 0.0)
     ),
 }

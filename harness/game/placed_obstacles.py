@@ -19,16 +19,11 @@ Range: TypeAlias = tuple[float, float]
 class OnLane:
     """A place on the centre line of a lane. Ranges are drawn uniformly, one after the other."""
 
-    line: FloatArray
-    """[n, 2]"""
-    position_m: Range
-    """Of the obstacle's centre, along the lane."""
-    offset_m: Range
-    """To the left of the centre line."""
-    turned_rad: Range
-    """From the lane's direction, counter-clockwise."""
-    scale: float = 1.0
-    """Metres of the line per metre of the lane."""
+    line: FloatArray  # [n, 2]
+    position_m: Range  # of the obstacle's centre, along the lane
+    offset_m: Range  # to the left of the centre line
+    turned_rad: Range  # from the lane's direction, counter-clockwise
+    scale: float = 1.0  # metres of the line per metre of the lane
 
     def pose(self, shares: tuple[float, float, float]) -> tuple[float, float, float]:
         """x_m, y_m and heading_rad at three shares, from 0 to 1, of the ranges."""
@@ -65,8 +60,7 @@ class PlacedObstacle:
     kind: str
     length_m: float
     width_m: float
-    hides: bool
-    """Whether it is higher than eyes."""
+    hides: bool  # is higher than eyes
     place: OnLane | AtPoint
 
     @property
@@ -86,8 +80,7 @@ class Obstacles:
     """The obstacles of a scene, and the walls of its buildings."""
 
     each: tuple[PlacedObstacle, ...] = ()
-    outlines: tuple[FloatArray, ...] = ()
-    """[n, 2] corners of the buildings, which hide and stand off the road."""
+    outlines: tuple[FloatArray, ...] = ()  # [n, 2] corners of the buildings, which hide and stand off the road
 
     def poses(self, *parts: str | int) -> FloatArray:
         """[O, 3] x_m, y_m and heading_rad in the game whose seeds have these parts."""

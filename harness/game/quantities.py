@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from operator import attrgetter
 
 import numpy as np
 
@@ -14,10 +15,10 @@ from harness.game.arrays import BoolArray, FloatArray
 from harness.game.bicycle import lateral_acceleration_mps2
 from harness.game.geometry import Box, distance_to_nearest_box, time_to_first_contact
 from harness.game.jit import compiled
-from harness.game.meetings import STANDING_MPS, Meetings, entered_before_s, least_gap_s, meetings
+from harness.game.meetings import HORIZON_S, STANDING_MPS, Meetings, meetings, no_meetings
 from harness.game.road import SPACING_M, Along
 from harness.game.route_coordinates import PATH_M, OnPath, on_path
-from harness.game.sight import hidden, nothing_hidden
+from harness.game.sight import hidden
 from harness.game.state import Bodies, State
 from harness.game.traffic_rules import TrafficRules, rules
 from harness.game.world import World
@@ -36,6 +37,16 @@ class Quantities:
     advanced_m: FloatArray  # along the route since the previous step
     lateral_offset_m: FloatArray  # from the route's line, left positive
 
+    # --- columns of `state`, `along` and `rules` that personas, metrics and rules use by name ---------------------
+
+    speed_mps = property(attrgetter("state.speed_mps"))
+    speed_limit_mps = property(attrgetter("along.speed_limit_mps"))
+    lane_offset_m = property(attrgetter("along.lane_offset_m"))
+    lane_end_m = property(attrgetter("along.lane_end_m"))
+    goal_m = property(attrgetter("along.goal_m"))
+    wrong_way = property(attrgetter("along.wrong_way"))
+    passed_red_s = property(attrgetter("rules.passed_red_s"))
+
     # --- the route ahead ---------------------------------------------------------------------------------------
 
     @cached_property
@@ -45,10 +56,6 @@ class Quantities:
         rows = routes.rows(self.state.station_m)[..., None] + np.rint(PATH_M / SPACING_M).astype(np.int64)
         return routes.heading_rad[np.clip(rows, routes.first_row[:, None], routes.last_row[:, None])]
 
-    @property
-    def speed_mps(self) -> FloatArray:
-        return self.state.speed_mps
-
     @cached_property
     def along(self) -> Along:
         """The route at the players."""
@@ -57,39 +64,10 @@ class Quantities:
         where = (state.station_m, self.lateral_offset_m, state.speed_mps)
         return world.road.routes.along(*where, limit_share=shares, wheelbase_m=wheelbase_m)
 
-    @property
-    def speed_limit_mps(self) -> FloatArray:
-        return self.along.speed_limit_mps
-
     @cached_property
     def speed_over_limit(self) -> FloatArray:
         """Excess over the speed limit as a share of the limit; negative below the limit."""
         return self.state.speed_mps / self.speed_limit_mps - 1.0
-
-    @property
-    def lane_offset_m(self) -> FloatArray:
-        """Distance from the centre of the nearest lane."""
-        return self.along.lane_offset_m
-
-    @property
-    def lane_end_m(self) -> FloatArray:
-        """Distance to the end of the player's lane; inf if the lane does not end."""
-        return self.along.lane_end_m
-
-    @property
-    def goal_m(self) -> FloatArray:
-        """Distance to the goal along the route; 0 or less after the goal."""
-        return self.along.goal_m
-
-    @property
-    def wrong_way(self) -> FloatArray:
-        """1 where the player is among oncoming lanes, else 0."""
-        return self.along.wrong_way
-
-    @property
-    def road_steering_rad(self) -> FloatArray:
-        """The steering angle that follows the route."""
-        return self.along.road_steering_rad
 
     @cached_property
     def lateral_acceleration_mps2(self) -> FloatArray:
@@ -110,16 +88,6 @@ class Quantities:
         records = (tables.stop_lines, tables.conflicts, self.meetings)
         next_line, numbers = rules(players, (state.signals, state.signal_s), tuple(map(tuple, records)))
         return TrafficRules(next_line, *numbers)
-
-    @property
-    def passed_red_s(self) -> FloatArray:
-        """Seconds since the signal became red, if the player passed its stop line in this step; else -1."""
-        return self.rules.passed_red_s
-
-    @property
-    def permitted_mps(self) -> FloatArray:
-        """Speed that the limits, signals, signs and right of way permit."""
-        return self.rules.permitted_mps
 
     @cached_property
     def speed_over_permitted(self) -> FloatArray:
@@ -150,14 +118,14 @@ class Quantities:
         """[G, P, B] bodies that a player does not see because something hides them (`game.sight`)."""
         state, bodies, hiding = self.state, self.bodies, self.world.hiding
         if not hiding.anything:
-            return nothing_hidden((*state.present.shape, bodies.present.shape[1]))
+            return np.zeros((*state.present.shape, bodies.present.shape[1]), dtype=bool)
         of_players = (state.x_m, state.y_m, state.present)
         return hidden(of_players, tuple(bodies), (hiding.obstacles, hiding.walls), hiding.vehicles)
 
     @cached_property
     def on_path(self) -> OnPath:
         """Bodies in route coordinates, each in the nearest frame of the route at `PATH_M`."""
-        routes, boxes = tuple(self.world.road.routes), tuple(self._boxes)
+        routes, boxes = tuple(self.world.road.routes), tuple(self.bodies.boxes)
         return OnPath(*on_path(self.state.station_m, self.lateral_offset_m, routes, boxes))
 
     @cached_property
@@ -180,22 +148,25 @@ class Quantities:
         """Each player's conflict with each body at a junction."""
         state, bodies, tables = self.state, self.bodies, self.world.right_of_way
         if not len(tables.conflicts.player):
-            return Meetings.none((*state.present.shape, bodies.present.shape[1]))
+            return no_meetings((*state.present.shape, bodies.present.shape[1]))
         players = (state.station_m, self.lateral_offset_m, state.speed_mps, self.world.length_m, self.visible)
-        columns = meetings(players, tuple(bodies), state.signals, tuple(tables.streams))
-        return Meetings.of(*columns)
+        conflict, numbers, must_yield = meetings(players, tuple(bodies), state.signals, tuple(tables.streams))
+        return Meetings._make((conflict, *numbers, must_yield))
 
     @cached_property
     def gap_s(self) -> FloatArray:
         """Time between the player's passage of a zone of conflict and that of another body, both at constant speed; inf
         without a zone that the player reaches within `meetings.HORIZON_S`."""
-        return least_gap_s(self.meetings)
+        met = self.meetings
+        return np.where(met.own_s < HORIZON_S, met.gap_s, np.inf).min(-1, initial=np.inf)
 
     @cached_property
     def entered_before_s(self) -> FloatArray:
         """For a player that entered a zone in this step: the least time until a body with priority is there, 0 if it is
         there already; else inf."""
-        return entered_before_s(self.meetings, self.advanced_m)
+        met = self.meetings
+        enters = (met.own_m <= 0.0) & (met.own_m + self.advanced_m[..., None] > 0.0)
+        return np.where(enters & met.must_yield, met.other_s, np.inf).min(-1, initial=np.inf)
 
     # --- surfaces ------------------------------------------------------------------------------------------------
 
@@ -206,14 +177,9 @@ class Quantities:
         return Box(state.x_m, state.y_m, state.heading_rad, world.length_m, world.width_m)
 
     @cached_property
-    def _boxes(self) -> Box:
-        """The bodies' boxes, [G, B]."""
-        return self.bodies.boxes
-
-    @cached_property
     def vehicle_clearance_m(self) -> FloatArray:
         """Distance to the nearest other body: 0 at contact, at most `REACH_M`."""
-        return distance_to_nearest_box(self._cars, self._boxes, self.visible, REACH_M)
+        return distance_to_nearest_box(self._cars, self.bodies.boxes, self.visible, REACH_M)
 
     @cached_property
     def rail_clearance_m(self) -> FloatArray:
@@ -234,7 +200,7 @@ class Quantities:
     def time_to_collision_s(self) -> FloatArray:
         """Seconds until contact with another body at constant headings and speeds; inf without a contact."""
         speeds_mps = (self.state.speed_mps, self.bodies.speed_mps)
-        return time_to_first_contact(self._cars, self._boxes, speeds_mps, self.visible)
+        return time_to_first_contact(self._cars, self.bodies.boxes, speeds_mps, self.visible)
 
 
 @compiled

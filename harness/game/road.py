@@ -74,9 +74,7 @@ class Routes(NamedTuple):
     curvature_per_m: FloatArray
     heading_rad: FloatArray
     bend_per_m: FloatArray  # curvature, smoothed over `_BEND_M`
-    bend_ahead_per_m: (
-        FloatArray  # [N, K] the tightest bend in each section between `AHEAD_M`, and from the last for 30 m
-    )
+    bend_ahead_per_m: FloatArray  # [N, K] the tightest in each section between `AHEAD_M`, and from the last for 30 m
     left_edge_m: FloatArray
     right_edge_m: FloatArray
     own_left_m: FloatArray
@@ -105,7 +103,9 @@ class Routes(NamedTuple):
         columns |= {
             "cos": np.cos(columns["heading_rad"]),
             "sin": np.sin(columns["heading_rad"]),
-            "curvature_per_m": np.concatenate([_curvature_per_m(route.heading_rad) for route in routes]),
+            "curvature_per_m": np.concatenate(
+                [np.gradient(np.unwrap(route.heading_rad), SPACING_M) for route in routes]
+            ),
             "bend_ahead_per_m": np.concatenate([_bend_ahead_per_m(route.heading_rad) for route in routes]),
             "approach_mps": np.concatenate([_approach_mps(route.speed_limit_mps) for route in routes]),
             "bend_per_m": np.concatenate([_bend_per_m(route.heading_rad) for route in routes]),
@@ -121,7 +121,8 @@ class Routes(NamedTuple):
 
     def rows(self, station_m: FloatArray) -> IntArray:
         """[G, P] rows of the table nearest to stations [G, P]."""
-        return _rows(station_m, self.first_row, self.last_row)
+        after = np.fmax(np.rint((station_m + MARGIN_M) / SPACING_M), 0.0)  # 0 for NaN
+        return self.first_row + np.minimum(after, self.last_row - self.first_row).astype(np.int64)
 
     def locate(self, x_m: FloatArray, y_m: FloatArray, station_m: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Stations and lateral offsets (m, left positive) [G, P] of points [G, P], given their previous stations."""
@@ -140,14 +141,6 @@ class Routes(NamedTuple):
         """The routes at players with stations, lateral offsets and speeds [G, P], factors on the speed limits [G] and
         wheelbases [P]."""
         return Along(*_along((station_m, offset_m, speed_mps), limit_share, wheelbase_m, tuple(self)))
-
-
-@compiled
-def _rows(station_m: FloatArray, first_row: IntArray, last_row: IntArray) -> IntArray:
-    rows = np.empty(station_m.shape, dtype=np.int64)
-    for g, p in np.ndindex(station_m.shape):
-        rows[g, p] = row_at(station_m[g, p], first_row[p], last_row[p])
-    return rows
 
 
 @compiled
@@ -175,12 +168,8 @@ def _locate(x_m: FloatArray, y_m: FloatArray, station_m: FloatArray, table: tupl
         station, offset = station_m[g, p], 0.0
         for _ in range(3):
             row = row_at(station, routes.first_row[p], routes.last_row[p])
-            dx, dy, cosine, sine = (
-                x_m[g, p] - routes.x_m[row],
-                y_m[g, p] - routes.y_m[row],
-                routes.cos[row],
-                routes.sin[row],
-            )
+            dx, dy = x_m[g, p] - routes.x_m[row], y_m[g, p] - routes.y_m[row]
+            cosine, sine = routes.cos[row], routes.sin[row]
             offset = dy * cosine - dx * sine
             stretch = max(1.0 - routes.curvature_per_m[row] * offset, _LEAST_STRETCH)
             along = (dx * cosine + dy * sine) / stretch
@@ -242,11 +231,6 @@ def _side_by_side(columns: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     widths = [column.size // len(column) for column in ordered.values()]
     parts = np.split(table, np.cumsum(widths)[:-1], axis=1)
     return {name: part[:, 0] if columns[name].ndim == 1 else part for name, part in zip(ordered, parts, strict=True)}
-
-
-def _curvature_per_m(heading_rad: FloatArray) -> FloatArray:
-    """[N] curvature of a route's line, left positive."""
-    return np.gradient(np.unwrap(heading_rad), SPACING_M)
 
 
 def _bend_per_m(heading_rad: FloatArray) -> FloatArray:

@@ -9,18 +9,15 @@
 | payoffs | finite as 32-bit numbers, as the learner stores them | |
 | observations | -1 to 1 | none |
 
-A player that the harness moves covers its new speed times the step; the tolerance covers rounding. A player that SUMO
-moves may cover a lane's width more, because a lane change without duration takes no time.
-
-A game does not continue after a fault. In an assessment, the game becomes a row with outcome `error`, and the other
-games are played. A training fails: its earlier steps may have the same fault, and omitting a game would change the
-training data.
+The tolerance covers rounding. A player that SUMO moves may cover a lane's width more, because a lane change without
+duration takes no time. A game does not continue after a fault. In an assessment, it becomes a row with outcome `error`.
+A training fails: its earlier steps may have the same fault, and omitting a game would change the training data.
 """
 
 from __future__ import annotations
 
 from operator import attrgetter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -119,30 +116,41 @@ def _outside(values: FloatArray) -> int:
     return count
 
 
-_moves = attrgetter(
-    "x_m", "y_m", "speed_mps", "heading_rad", "acceleration_mps2", "steering_rad", "station_m"
-)  # the motion of players, of a state
+class _Moves(NamedTuple):
+    """The columns of `State` that have the motion of the players."""
+
+    x_m: FloatArray
+    y_m: FloatArray
+    speed_mps: FloatArray
+    heading_rad: FloatArray
+    acceleration_mps2: FloatArray
+    steering_rad: FloatArray
+    station_m: FloatArray
+
+
+_moves = attrgetter(*_Moves._fields)
 
 
 @compiled
 def _first_fault(
-    motions: tuple[tuple[FloatArray, ...], tuple[FloatArray, ...]],
+    motions: tuple[tuple[Any, ...], tuple[Any, ...]],
     bodies: tuple[Any, ...],
     step: tuple[BoolArray, FloatArray, FloatArray, FloatArray],
     step_s: float,
 ) -> tuple[int, int, int]:
     """The first fault, its game and its player: the motion before and after the step, the bodies, and who drove, the
     payoffs, the tolerance and the top speeds."""
-    (before, now), among, (drove, payoff, slack, max_speed_mps) = motions, Bodies(*bodies), step
-    x_m, y_m, speed_mps = now[0], now[1], now[2]
+    before, now, among = _Moves(*motions[0]), _Moves(*motions[1]), Bodies(*bodies)
+    drove, payoff, slack, max_speed_mps = step
     players = drove.shape[1]
     for g, p in np.ndindex(drove.shape):
         if drove[g, p]:
             for values in now:
                 if not np.isfinite(values[g, p]):
                     return _MOTION, g, p
-            speed = min(max(abs(before[2][g, p]), abs(speed_mps[g, p])), max_speed_mps[p])  # walkers step back
-            if not np.hypot(x_m[g, p] - before[0][g, p], y_m[g, p] - before[1][g, p]) <= speed * step_s + slack[p]:
+            speed = min(max(abs(before.speed_mps[g, p]), abs(now.speed_mps[g, p])), max_speed_mps[p])  # or backwards
+            moved_m = np.hypot(now.x_m[g, p] - before.x_m[g, p], now.y_m[g, p] - before.y_m[g, p])
+            if not moved_m <= speed * step_s + slack[p]:
                 return _MOVED, g, p
         if p == 0:  # the players of a game have the same bodies
             for b in range(players, among.present.shape[1]):

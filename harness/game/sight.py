@@ -14,7 +14,7 @@ bus behind a van is hidden.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 from math import cos, hypot, inf, sin
 from typing import Any
 
@@ -36,12 +36,10 @@ SIGHT_LINE_M = 120.0
 class Hiding:
     """What hides road users in a scene."""
 
+    # [O] whether each obstacle does; obstacles are the last O bodies of a game
     obstacles: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=bool))
-    """[O] whether each obstacle does; obstacles are the last O bodies of a game."""
-    walls: FloatArray = field(default_factory=lambda: np.zeros((0, 2, 2)))
-    """[S, 2, 2] start and end of the walls of buildings."""
-    vehicles: bool = False
-    """Whether a vehicle of the scene is tall."""
+    walls: FloatArray = field(default_factory=lambda: np.zeros((0, 2, 2)))  # [S, 2, 2] their start and end
+    vehicles: bool = False  # whether a vehicle of the scene is tall
 
     @cached_property
     def anything(self) -> bool:
@@ -50,12 +48,6 @@ class Hiding:
 
 
 NOTHING_HIDES = Hiding()
-
-
-@lru_cache(maxsize=64)
-def nothing_hidden(shape: tuple[int, ...]) -> BoolArray:
-    """No body is hidden, [G, P, B]. The same array for equal shapes: it is only read."""
-    return np.zeros(shape, dtype=bool)
 
 
 @compiled

@@ -10,6 +10,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations
 from math import atan2, hypot
 
 import numpy as np
@@ -135,20 +136,18 @@ def _draw(
 
 def _apart(x_m: FloatArray, y_m: FloatArray, length_m: FloatArray, present: BoolArray) -> bool:
     """Whether all players that are present are at least `_APART_M` from one another."""
-    for one in range(len(x_m)):
-        for other in range(one):
-            least_m = 0.5 * (length_m[one] + length_m[other]) + _APART_M
-            if present[one] and present[other] and np.hypot(x_m[one] - x_m[other], y_m[one] - y_m[other]) < least_m:
-                return False
-    return True
+    there = np.flatnonzero(present).tolist()
+    return all(
+        np.hypot(x_m[one] - x_m[other], y_m[one] - y_m[other]) >= 0.5 * (length_m[one] + length_m[other]) + _APART_M
+        for one, other in combinations(there, 2)
+    )
 
 
 def _clear(starts: FloatArray, length_m: FloatArray, present: BoolArray, obstacles: Box | None) -> bool:
     """Whether no obstacle stands on the way just before, beside or behind a player that is present."""
     boxes = [] if obstacles is None else [Box(*each) for each in np.array(obstacles).T.tolist()]
-    for player in np.flatnonzero(present).tolist():
-        x_m, y_m, heading_rad = starts[:3, player].tolist()
-        way = Box(x_m, y_m, heading_rad, float(length_m[player]) + 2.0 * _APART_M, _CLEAR_WIDTH_M)
-        if any(box_distance(way, box) <= 0.0 for box in boxes):
-            return False
-    return True
+    ways = [
+        Box(x_m, y_m, heading_rad, own_m + 2.0 * _APART_M, _CLEAR_WIDTH_M)
+        for x_m, y_m, heading_rad, own_m in zip(*starts[:3, present].tolist(), length_m[present].tolist(), strict=True)
+    ]
+    return all(box_distance(way, box) > 0.0 for way in ways for box in boxes)

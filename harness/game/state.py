@@ -1,8 +1,8 @@
-"""The state of G games at one time: players, and all bodies with an extent."""
+"""The state of G games at one time: players, how their games end, and all bodies with an extent."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -55,28 +55,20 @@ class State:
     def empty(cls, games: int, players: int, signals: int = 0) -> State:
         """A state of zeros without human factors, in which no player is present."""
         shape = (games, players)
-        return cls(
-            x_m=np.zeros(shape),
-            y_m=np.zeros(shape),
-            heading_rad=np.zeros(shape),
-            speed_mps=np.zeros(shape),
-            acceleration_mps2=np.zeros(shape),
-            steering_rad=np.zeros(shape),
-            station_m=np.zeros(shape),
-            outcome=np.zeros(shape, dtype=np.int8),
-            present=np.zeros(shape, dtype=bool),
-            lapsed=np.zeros(shape, dtype=bool),
-            unseen_behind_m=np.full(shape, -np.inf),
-            sight_m=np.full(shape, np.inf),
-            sight_cosine=np.full(shape, ALL_AROUND),
-            distance_error=np.zeros(shape),
-            closing_error_per_s=np.zeros(shape),
-            step=np.zeros(games, dtype=np.int64),
-            friction=np.ones(games),
-            limit_share=np.ones(games),
-            signals=np.zeros((games, signals), dtype=np.int8),
-            signal_s=np.zeros((games, signals)),
-        )
+        columns: dict[str, Any] = {each.name: np.zeros(shape) for each in fields(cls)}
+        columns |= {name: np.zeros(shape, dtype=bool) for name in ("present", "lapsed")}
+        columns |= {
+            "outcome": np.zeros(shape, dtype=np.int8),
+            "unseen_behind_m": np.full(shape, -np.inf),
+            "sight_m": np.full(shape, np.inf),
+            "sight_cosine": np.full(shape, ALL_AROUND),
+            "step": np.zeros(games, dtype=np.int64),
+            "friction": np.ones(games),
+            "limit_share": np.ones(games),
+            "signals": np.zeros((games, signals), dtype=np.int8),
+            "signal_s": np.zeros((games, signals)),
+        }
+        return cls(**columns)
 
     @property
     def running(self) -> BoolArray:
@@ -149,3 +141,28 @@ def _with_nearest(players: tuple[Any, ...], vehicles: tuple[Any, ...]) -> tuple[
             for k in range(added):
                 columns[column, g, player_count + k] = of_vehicles[column][g, nearest[k]]
     return columns, present
+
+
+@compiled
+def terminations(
+    outcome: IntArray,
+    drove: BoolArray,
+    ends: tuple[BoolArray, BoolArray],
+    distances_m: tuple[FloatArray, FloatArray, FloatArray],
+) -> None:
+    """Set the outcomes [G, P] of the players that drove [G, P], in place: contact before goal, goal before timeout.
+
+    `ends` are the players that the harness drives [P], for which alone contact with a rail counts, and the games whose
+    time is up [G]; `distances_m` are those to the goal, to vehicles and to rails [G, P].
+    """
+    (taken_over, time_is_up), (goal_m, vehicle_clearance_m, rail_clearance_m) = ends, distances_m
+    for g, p in np.ndindex(outcome.shape):
+        if drove[g, p]:
+            if vehicle_clearance_m[g, p] <= 0.0:
+                outcome[g, p] = Outcome.COLLISION
+            elif rail_clearance_m[g, p] <= 0.0 and taken_over[p]:
+                outcome[g, p] = Outcome.RAIL
+            elif goal_m[g, p] <= 0.0:
+                outcome[g, p] = Outcome.GOAL
+            elif time_is_up[g]:
+                outcome[g, p] = Outcome.TIMEOUT

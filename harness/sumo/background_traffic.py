@@ -18,13 +18,12 @@ from libsumo import _libsumo  # the same functions without Python wrappers
 
 from harness.errors import SimulationError
 from harness.game.arrays import FloatArray, IntArray
-from harness.game.near_players import NearSearch
 from harness.road.demand.route_file import Departure
 from harness.road.xml.angles import heading_rad_of
 from harness.sumo.background_people import BackgroundPeople
 from harness.sumo.insertion import Insertion, put_beside
 from harness.sumo.simulation import Players, Reading, Tiles, reading_of, side_by_side
-from harness.sumo.vehicle_reads import DIRECT, read_near, string_record
+from harness.sumo.vehicle_reads import DIRECT, NearSearch, read_near, string_record
 
 _LONGEST_WAIT = 50  # steps
 _NEVER = -1

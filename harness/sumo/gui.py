@@ -11,7 +11,7 @@ import os
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -35,39 +35,33 @@ class WindowClosed(SimulationError):
 
 
 class GuiWindow:
-    """A running SUMO-GUI that waits for steps."""
+    """A running SUMO-GUI that waits for steps. Every method but `release` raises WindowClosed if SUMO-GUI has ended."""
 
     def __init__(self, connection: Any, process: subprocess.Popen[bytes], patient: bool) -> None:
         self._connection, self.process = connection, process
         # traci has no option for a timeout; a SUMO-GUI that shows an error dialogue never answers
         connection._socket.settimeout(_ANSWERS_WITHIN_S)
-        with self._open():
-            self._view = connection.gui.getIDList()[0]
+        self._view = self._call(connection.gui.getIDList)[0]
         if patient:
             connection._socket.settimeout(None)
 
     def step(self) -> None:
-        """Play one step, at the pace of SUMO-GUI. Raises WindowClosed if SUMO-GUI has ended."""
-        with self._open():
-            self._connection.simulationStep()
+        """Play one step, at the pace of SUMO-GUI."""
+        self._call(self._connection.simulationStep)
 
     def has(self, vehicle: str) -> bool:
         """Whether a vehicle is in the traffic."""
-        with self._open():
-            return vehicle in self._connection.vehicle.getIDList()
+        return vehicle in self._call(self._connection.vehicle.getIDList)
 
     def follow(self, vehicle: str) -> None:
         """Keep a vehicle of the traffic in the centre of the view."""
-        with self._open():
-            self._connection.gui.trackVehicle(self._view, vehicle)
+        self._call(self._connection.gui.trackVehicle, self._view, vehicle)
 
     def look_at(self, x_m: float, y_m: float, width_m: float, height_m: float) -> None:
         """Show an area around a point."""
         half_width, half_height = 0.5 * width_m, 0.5 * height_m
-        with self._open():
-            self._connection.gui.setBoundary(
-                self._view, x_m - half_width, y_m - half_height, x_m + half_width, y_m + half_height
-            )
+        corners = (x_m - half_width, y_m - half_height, x_m + half_width, y_m + half_height)
+        self._call(self._connection.gui.setBoundary, self._view, *corners)
 
     def wait_until_it_looks_at(self, x_m: float, y_m: float, width_m: float, height_m: float) -> None:
         """Show an area and wait until the view stays there: while SUMO-GUI starts, it still applies its own view.
@@ -80,25 +74,22 @@ class GuiWindow:
                 raise WindowClosed("SUMO-GUI does not show the requested area")
             self.look_at(x_m, y_m, width_m, height_m)
             time.sleep(_LOOKS_EVERY_S)
-            with self._open():
-                (left, bottom), (right, top) = self._connection.gui.getBoundary(self._view)
+            (left, bottom), (right, top) = self._call(self._connection.gui.getBoundary, self._view)
             centred = abs(0.5 * (left + right) - x_m) < _CENTRED_M and abs(0.5 * (bottom + top) - y_m) < _CENTRED_M
             stays = stays + 1 if centred else 0
 
     def photograph_next(self, file: Path, size_px: tuple[int, int]) -> None:
         """Take a screenshot of the next step. The file exists after that step."""
-        with self._open():
-            self._connection.gui.screenshot(self._view, str(file), *size_px)
+        self._call(self._connection.gui.screenshot, self._view, str(file), *size_px)
 
     def release(self) -> None:
         """End the simulation. The window stays open until its user closes it."""
         with contextlib.suppress(TraCIException, FatalTraCIError, OSError):
             self._connection.close(wait=False)
 
-    @contextlib.contextmanager
-    def _open(self) -> Iterator[None]:
+    def _call(self, function: Callable[..., Any], *arguments: Any) -> Any:
         try:
-            yield
+            return function(*arguments)
         except (FatalTraCIError, OSError) as error:
             raise WindowClosed(f"SUMO-GUI has ended: {error}") from error
 

@@ -1,4 +1,4 @@
-"""Positions, angles and speeds of many vehicles in SUMO.
+"""Positions, angles and speeds of the vehicles in SUMO that are near enough to a player to affect the game.
 
 Most of the time of a libsumo call from Python goes into the conversion of arguments and result; the C++ function takes
 a third of it. On Linux x86-64, a compiled loop therefore calls the C++ functions of libsumo's public interface, in the
@@ -15,7 +15,7 @@ from __future__ import annotations
 import ctypes
 import platform
 from itertools import chain
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from libsumo import _libsumo  # the same functions without Python wrappers, for frequent calls
@@ -23,9 +23,9 @@ from llvmlite import binding
 from numba import types
 from numpy.typing import NDArray
 
-from harness.game.arrays import FloatArray, IntArray
+from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.jit import compiled
-from harness.game.near_players import NearSearch, is_near, near_players
+from harness.game.state import NOTICED_M
 
 _STRING = "RKNSt7__cxx1112basic_stringIcSt11char_traitsIcESaIcEEE"  # const std::string&
 _SYMBOLS = {
@@ -64,6 +64,23 @@ def string_record(text: bytes) -> tuple[int, int, int, int]:
     return ctypes.cast(ctypes.c_char_p(text), ctypes.c_void_p).value or 0, len(text), 0, 0
 
 
+class NearSearch(NamedTuple):
+    """What decides which vehicles are near a player, and when to read the others again."""
+
+    due_in: IntArray  # [G, N] the step in which to read each vehicle of a table again; written by `_is_near`
+    length_m: FloatArray  # [G, N]
+    max_speed_mps: FloatArray  # [G, N]
+    offsets_m: FloatArray  # [G] y offsets of the games' tiles
+    players_x_m: FloatArray  # [G, P]
+    players_y_m: FloatArray
+    players_present: BoolArray
+    fastest_player_mps: float
+    step: int  # the current one
+    step_s: float
+    longest_wait: int  # steps
+    all_vehicles: bool  # count as near
+
+
 def read_near(
     search: NearSearch, names: NDArray[np.object_], *, records: NDArray[np.uint64], due: IntArray, direct: bool
 ) -> tuple[IntArray, FloatArray]:
@@ -78,13 +95,48 @@ def read_near(
     named = names.ravel()[due].tolist()
     fronts = np.fromiter(chain.from_iterable(map(_libsumo.vehicle_getPosition, named)), float, 2 * len(due))
     fronts_m = fronts.reshape(-1, 2)
-    near = near_players(search, due, fronts_m)
+    near = _near(search, due, fronts_m)
     named = [named[k] for k in near.tolist()]
     motion = np.empty((4, len(near)))
     motion[:2] = fronts_m[near].T
     motion[2] = np.fromiter(map(_libsumo.vehicle_getAngle, named), float, len(near))
     motion[3] = np.fromiter(map(_libsumo.vehicle_getSpeed, named), float, len(near))
     return due[near], motion
+
+
+@compiled
+def _is_near(search: NearSearch, place: int, front_x_m: float, front_y_m: float) -> bool:
+    """Whether a vehicle may be near a player of its game. `place` is its flat position in the table [G, N].
+
+    The front bumper is in the coordinates of the game, without the offset of its tile. In place: `due_in` becomes the
+    step in which to read the vehicle again. A near vehicle is due in the next step, any other in the first step in
+    which it may have come near, at most `longest_wait` steps from now.
+    """
+    room = search.due_in.shape[1]
+    game, column = place // room, place % room
+    distance_m = np.inf
+    for p in range(search.players_present.shape[1]):
+        if search.players_present[game, p]:
+            dx, dy = front_x_m - search.players_x_m[game, p], front_y_m - search.players_y_m[game, p]
+            distance_m = min(distance_m, np.hypot(dx, dy))
+    # distances count from a vehicle's centre, which is behind its front by less than its length
+    spare_m = distance_m - NOTICED_M - search.length_m[game, column]
+    reach_m = (search.max_speed_mps[game, column] + search.fastest_player_mps) * search.step_s
+    search.due_in[game, column] = search.step + int(max(min(spare_m / reach_m, search.longest_wait), 1.0))
+    return search.all_vehicles or spare_m <= 0.0
+
+
+@compiled
+def _near(search: NearSearch, due: IntArray, fronts_m: FloatArray) -> IntArray:
+    """[m] indices of the vehicles near a player, of those at flat places [n] with front bumpers [n, 2]. In place: the y
+    of the bumpers loses the offset of the tile, and `due_in` is written as by `_is_near`."""
+    near, count = np.empty(len(due), dtype=np.int64), 0
+    for k in range(len(due)):
+        fronts_m[k, 1] -= search.offsets_m[due[k] // search.due_in.shape[1]]
+        if _is_near(search, due[k], fronts_m[k, 0], fronts_m[k, 1]):
+            near[count] = k
+            count += 1
+    return near[:count]
 
 
 @compiled
@@ -96,7 +148,7 @@ def _read_near(search: NearSearch, records: NDArray[np.uint64], due: IntArray) -
         name = records.ctypes.data + _RECORD_BYTES * place
         _position(position.ctypes.data, name, 0)
         x_m, y_m = position[_X], position[_Y] - search.offsets_m[place // records.shape[1]]
-        if is_near(search, place, x_m, y_m):
+        if _is_near(search, place, x_m, y_m):
             places[count], motion[0, count], motion[1, count] = place, x_m, y_m
             motion[2, count], motion[3, count] = _angle(name), _speed(name)
             count += 1

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from harness.game.arrays import FloatArray
 from harness.game.bicycle import (
     GRAVITY_MPS2,
     ActuatorLimits,
@@ -183,37 +182,26 @@ def test_steering_range__is_the_lock_or_the_grip_limit(speed: float, steering: f
 
 
 @pytest.mark.parametrize(
-    ("action", "acceleration", "steering"),
+    ("action", "road", "acceleration", "steering"),
     [
-        ((0.0, 0.0), 0.0, 0.0),
-        ((1.0, 1.0), 3.0, 0.208807),
-        ((0.5, -0.5), 1.5, -0.045677),  # progressive: 0.5 * (0.25 + 0.75 * 0.5^2) = 0.21875 of 0.208807
-        ((-1.0, 0.0), -8.0, 0.0),
-        ((-0.25, -1.0), -2.0, -0.208807),
-        ((7.0, -9.0), 3.0, -0.208807),  # clamped to [-1, 1]
+        ((0.0, 0.0), 0.0, 0.0, 0.0),
+        ((1.0, 1.0), 0.0, 3.0, 0.208807),
+        ((0.5, -0.5), 0.0, 1.5, -0.045677),  # progressive: 0.5 * (0.25 + 0.75 * 0.5^2) = 0.21875 of 0.208807
+        ((-0.25, -1.0), 0.0, -2.0, -0.208807),
+        ((7.0, -9.0), 0.0, 3.0, -0.208807),  # clamped to [-1, 1]
+        ((-1.0, 0.0), 0.15, -8.0, 0.15),  # a wheel of 0 follows the road
+        ((0.0, -0.5), 0.15, 0.0, 0.15 - 0.045677),
+        ((0.0, 1.0), -0.15, 0.0, -0.15 + 0.208807),
+        ((0.0, 1.0), 0.5, 0.0, 0.6),  # not beyond the lock
+        ((0.0, -1.0), -0.9, 0.0, -0.6),
     ],
 )
-def test_requests__scale_pedals_and_wheel(action: tuple[float, float], acceleration: float, steering: float) -> None:
-    speed: FloatArray = np.array([[10.0]])
-    requested, wheel = requests(np.array([[action]]), speed, np.zeros((1, 1)), actuators())
+def test_requests__scale_pedals_and_wheel(
+    action: tuple[float, float], road: float, acceleration: float, steering: float
+) -> None:
+    requested, wheel = requests(np.array([[action]]), np.array([[10.0]]), np.array([[road]]), actuators())
     assert requested[0, 0] == pytest.approx(acceleration)
     assert wheel[0, 0] == pytest.approx(steering, abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("wheel", "road", "steering"),
-    [
-        (0.0, 0.15, 0.15),  # a wheel of 0 follows the road
-        (-0.5, 0.15, 0.15 - 0.045677),
-        (1.0, -0.15, -0.15 + 0.208807),
-        (1.0, 0.5, 0.6),  # not beyond the lock
-        (-1.0, -0.9, -0.6),
-    ],
-)
-def test_requests__the_wheel_is_relative_to_the_bend_of_the_road(wheel: float, road: float, steering: float) -> None:
-    speed = np.array([[10.0]])
-    _, requested = requests(np.array([[(0.0, wheel)]]), speed, np.array([[road]]), actuators())
-    assert requested[0, 0] == pytest.approx(steering, abs=1e-6)
 
 
 @settings(max_examples=100, deadline=None)

@@ -12,7 +12,6 @@ from harness.game.arrays import FloatArray
 from harness.game.geometry import (
     Box,
     box_distance,
-    box_segment_distance,
     distance_to_nearest_box,
     distance_to_nearest_segment,
     time_to_contact,
@@ -69,13 +68,6 @@ def test_boxes__distance_and_touch_are_shapelys(a: Box, b: Box) -> None:
     assert touch(a, b) == touch(b, a) or distance < 1e-9
 
 
-@settings(max_examples=300, deadline=None)
-@given(BOXES, st.tuples(NUMBER, NUMBER, NUMBER, NUMBER))
-def test_box_segment__distance_is_shapelys(a: Box, ends: tuple[float, float, float, float]) -> None:
-    line = shapely.LineString([ends[:2], ends[2:]])
-    assert box_segment_distance(a, segment(*ends)) == pytest.approx(polygon(a).distance(line), abs=1e-6)
-
-
 def columns(*boxes: Box) -> Box:
     """Boxes as one row [1, B]."""
     return Box(*(np.array([each]) for each in zip(*boxes, strict=True)))
@@ -96,7 +88,7 @@ def test_nearest_box__is_the_least_distance_of_those_marked(own: list[Box], othe
         assert found[0, p] == pytest.approx(min([*distances, limit]), abs=1e-6)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=300, deadline=None)
 @given(BOXES, st.lists(st.tuples(NUMBER, NUMBER, NUMBER, NUMBER), min_size=1, max_size=6), st.floats(0.5, 15.0))
 def test_nearest_segment__is_the_least_distance_of_the_rows(
     a: Box, ends: list[tuple[float, float, float, float]], limit: float

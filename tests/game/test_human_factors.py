@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -23,32 +22,22 @@ from harness.game.human_factors import (
     PlayersLimits,
     Reaction,
     Sight,
-    draw_delay_steps,
     draw_estimation_errors,
     draw_lapses,
-    draw_noticed_m,
     unseen_behind_m,
 )
 from harness.game.initial_state import InitialState, draw_initial_state
-from harness.game.observation import observe
 from harness.game.observation_layout import LAYOUT, in_units
-from harness.game.quantities import Quantities
 from harness.game.state import State
 from harness.game.world import World
 from harness.road.scene.open_scene import OpenScene
+from tests.support.moments import Moment, car, seen
 from tests.support.scenes import build_scene, drawn
-
-Moment = Callable[..., Quantities]
 
 
 @pytest.fixture(scope="module")
 def straight(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
     return build_scene(tmp_path_factory.mktemp("scenes") / "straight")
-
-
-@pytest.fixture(scope="module")
-def world(merge: OpenScene) -> World:
-    return merge.world
 
 
 @pytest.fixture(scope="module")
@@ -134,22 +123,20 @@ def test_delay__extends_lapses_and_starts_none_earlier(seed: int, delay: int) ->
         assert (delayed.lapsed == lapses.lapsed).all()
 
 
-def test_delay__is_drawn_from_its_range() -> None:
-    drawn = [draw_delay_steps(Reaction(delay_s=(0.3, 0.8)), 0.1, np.random.default_rng(seed)) for seed in range(500)]
+def body_limits(straight: OpenScene, human_factors: HumanFactors, games: int) -> list[Limits]:
+    """The non-ego's limits in some games."""
+    starts = straight.start_distribution([HumanFactors(), human_factors], [1.0, 1.0])
+    return [draw_initial_state(starts, "episode", game).limits[1] for game in range(games)]
+
+
+def test_delay__is_drawn_from_its_range(straight: OpenScene) -> None:
+    late = HumanFactors(reaction=Reaction(delay_s=(0.3, 0.8)))
+    drawn = [each.delay_steps for each in body_limits(straight, late, 500)]
     assert set(drawn) == {3, 4, 5, 6, 7, 8}
     assert np.mean(drawn) == pytest.approx(5.5, abs=0.3)  # 4 standard errors of 1.44 / sqrt(500)
 
 
 # --- sight ------------------------------------------------------------------------------------------------------------
-
-
-def car(x: float, y: float = -1.6, **more: Any) -> dict[str, Any]:
-    return {"x_m": x, "y_m": y, **more}
-
-
-def seen(q: Quantities) -> dict[str, float]:
-    """The ego's observation in the units that the names of the entries end with."""
-    return dict(zip(LAYOUT, in_units(observe(q)[0, 0], 0.6).tolist(), strict=True))
 
 
 def test_range__a_vehicle_beyond_it_is_not_seen(moment: Moment, world: World) -> None:
@@ -208,11 +195,11 @@ def test_errors__an_arena_applies_the_error_of_each_step(arena: Arena, straight:
         assert (observation[1, 1] == observation[0, 1]).all()  # the other player has no errors
 
 
-def test_failure_to_see__occurs_in_its_share_of_the_games() -> None:
-    failure = Sight(looked_but_failed_to_see_share=0.25, noticed_within_m=8.0)
-    drawn = [draw_noticed_m(failure, np.random.default_rng(seed)) for seed in range(2000)]
+def test_failure_to_see__occurs_in_its_share_of_the_games(straight: OpenScene) -> None:
+    failure = HumanFactors(sight=Sight(looked_but_failed_to_see_share=0.25, noticed_within_m=8.0))
+    drawn = [each.sight_m for each in body_limits(straight, failure, 1000)]
     assert set(drawn) == {8.0, np.inf}
-    assert np.mean(np.isfinite(drawn)) == pytest.approx(0.25, abs=4 * 0.0097)
+    assert np.mean(np.isfinite(drawn)) == pytest.approx(0.25, abs=4 * 0.0137)
 
 
 def test_open_eyes__remove_failures_to_see_and_keep_the_limits_of_the_body() -> None:
@@ -252,10 +239,7 @@ BODY = HumanFactors(
 
 def test_start__without_limits_has_none(straight: OpenScene) -> None:
     assert all(each is NO_LIMITS for each in drawn(straight, 1).limits)
-    assert (
-        draw_initial_state(straight.start_distribution([[HumanFactors(sight=Sight())]] * 2, [1.0, 1.0]), 1).limits
-        == (NO_LIMITS,) * 2
-    )
+    assert body_limits(straight, HumanFactors(sight=Sight()), 1) == [NO_LIMITS]
 
 
 def test_start__limits_of_another_player_do_not_change_the_draws(straight: OpenScene) -> None:
@@ -278,15 +262,9 @@ def test_start__limits_of_another_player_do_not_change_the_draws(straight: OpenS
 
 
 def test_start__each_limit_is_drawn_independently(straight: OpenScene) -> None:
-    def limits(human_factors: HumanFactors) -> Limits:
-        return draw_initial_state(
-            straight.start_distribution([[HumanFactors()], [human_factors]], [1.0, 1.0]), "episode", 3
-        ).limits[1]
-
     everything, late, inexact = (
-        limits(BODY),
-        limits(HumanFactors(reaction=BODY.reaction)),
-        limits(HumanFactors(sight=BODY.sight)),
+        body_limits(straight, each, 1)[0]
+        for each in (BODY, HumanFactors(reaction=BODY.reaction), HumanFactors(sight=BODY.sight))
     )
     assert everything.delay_steps == late.delay_steps
     assert late.estimation_errors is None

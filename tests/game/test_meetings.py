@@ -7,8 +7,6 @@ the stream. Cars are 4.6 m long.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 
@@ -18,8 +16,8 @@ from harness.game.quantities import Quantities
 from harness.game.world import World
 from harness.road.scene.open_scene import OpenScene
 from tests.support.conflicts import CROSSING, with_conflicts
+from tests.support.moments import Moment
 
-Moment = Callable[..., Quantities]
 NORTH = np.pi / 2.0
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -17,24 +17,15 @@ from harness.game.observation_layout import LAYOUT, OF_OTHERS, OTHERS, SIZE
 from harness.game.outcome import Outcome
 from harness.game.quantities import Quantities
 from harness.game.rails import Rails
-from harness.game.road import AHEAD_M, MARGIN_M, SPACING_M, Road, Route, Routes
+from harness.game.road import AHEAD_M, Road, Routes
 from harness.game.world import World
 from harness.road.scene.open_scene import OpenScene
-
-Moment = Callable[..., Quantities]
-
-
-@pytest.fixture(scope="module")
-def world(merge: OpenScene) -> World:
-    return merge.world
+from tests.support.moments import Moment, car
+from tests.support.roads import straight
 
 
 def seen(q: Quantities, player: int = 0) -> Mapping[str, float]:
     return dict(zip(LAYOUT, observe(q)[0, player].tolist(), strict=True))
-
-
-def car(x: float, y: float = -1.6, **more: Any) -> dict[str, Any]:
-    return {"x_m": x, "y_m": y, **more}
 
 
 def test_layout__names_every_entry_once() -> None:
@@ -180,29 +171,20 @@ def test_leader__is_the_nearest_car_ahead_in_the_own_lane(moment: Moment, world:
 
 def road(world: World, heading: float, x0: float, y0: float, left: float, right: float, lanes: list[float]) -> World:
     """A straight road of 200 m with any start and heading."""
-    at = np.arange(-MARGIN_M, 200.0 + MARGIN_M, SPACING_M)
-    n = len(at)
-
-    def line(offset: float) -> FloatArray:
-        x = x0 + at * np.cos(heading) - offset * np.sin(heading)
-        return np.stack((x, y0 + at * np.sin(heading) + offset * np.cos(heading)), axis=1)
-
-    middle = line(0.0)
-    ends = np.where(np.array(lanes) == 0.0, np.inf, 150.0)
-    table = Route(
-        x_m=middle[:, 0],
-        y_m=middle[:, 1],
-        heading_rad=np.full(n, heading),
-        left_edge_m=np.full(n, left),
-        right_edge_m=np.full(n, right),
-        own_left_m=np.full(n, left - 1.0),
-        own_right_m=np.full(n, right + 1.0),
-        speed_limit_mps=np.full(n, 14.0),
+    table = straight(heading, 200.0, len(lanes), x0, y0)
+    n, ends = len(table.x_m), np.where(np.array(lanes) == 0.0, np.inf, 150.0)
+    columns = {"left_edge_m": left, "right_edge_m": right, "own_left_m": left - 1.0, "own_right_m": right + 1.0}
+    table = replace(
+        table,
+        **{name: np.full(n, value) for name, value in columns.items()},
         lane_offset_m=np.tile(lanes, (n, 1)),
         lane_end_m=np.tile(ends, (n, 1)),
-        length_m=200.0,
-        goal_m=180.0,
     )
+
+    def line(offset: float) -> FloatArray:
+        x, y = table.x_m - offset * np.sin(heading), table.y_m + offset * np.cos(heading)
+        return np.stack((x, y), axis=1)
+
     rails = np.concatenate([np.stack((line(side)[:-1:20], line(side)[1::20]), axis=1) for side in (left, right)])
     return replace(world, road=Road(Rails.of(rails, 20.0), Routes.of([table, table])))
 

@@ -5,9 +5,7 @@ On the merge road lane 1 (y = -1.6) continues and lane 0 (y = -4.8) ends at 100 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,17 +13,12 @@ import pytest
 from harness.game.outcome import Outcome
 from harness.game.quantities import REACH_M, Quantities
 from harness.game.rails import Rails
-from harness.game.road import MARGIN_M, SPACING_M, Road, Route, Routes
+from harness.game.road import MARGIN_M, SPACING_M, Road, Routes
 from harness.game.world import World
-from harness.road.scene.open_scene import OpenScene
+from tests.support.moments import Moment, car
+from tests.support.roads import route
 
-Moment = Callable[..., Quantities]
 LANE_0_M, LANE_1_M = -4.8, -1.6
-
-
-@pytest.fixture(scope="module")
-def world(merge: OpenScene) -> World:
-    return merge.world
 
 
 def turning(world: World, radius_m: float, turned_rad: float) -> World:
@@ -33,23 +26,11 @@ def turning(world: World, radius_m: float, turned_rad: float) -> World:
     at = np.arange(-MARGIN_M, 150.0 + MARGIN_M, SPACING_M)
     turned = np.clip((at - 20.0) / radius_m, 0.0, turned_rad)
     beyond = np.maximum(at - 20.0 - radius_m * turned_rad, 0.0)
-    n = len(at)
-    route = Route(
-        x_m=np.minimum(at, 20.0) + radius_m * np.sin(turned) + beyond * np.cos(turned_rad),
-        y_m=radius_m * (1.0 - np.cos(turned)) + beyond * np.sin(turned_rad),
-        heading_rad=turned,
-        left_edge_m=np.full(n, 1.6),
-        right_edge_m=np.full(n, -1.6),
-        own_left_m=np.full(n, np.inf),
-        own_right_m=np.full(n, -np.inf),
-        speed_limit_mps=np.full(n, 10.0),
-        lane_offset_m=np.zeros((n, 1)),
-        lane_end_m=np.full((n, 1), np.inf),
-        length_m=150.0,
-        goal_m=100.0,
-    )
+    x = np.minimum(at, 20.0) + radius_m * np.sin(turned) + beyond * np.cos(turned_rad)
+    y = radius_m * (1.0 - np.cos(turned)) + beyond * np.sin(turned_rad)
+    bent = route(x, y, turned, 150.0)
     rails = Rails.of(np.zeros((0, 2, 2)), 20.0)
-    return replace(world, road=Road(rails, Routes.of([route, route])))
+    return replace(world, road=Road(rails, Routes.of([bent, bent])))
 
 
 @pytest.fixture(scope="module")
@@ -64,10 +45,6 @@ def hairpin(world: World) -> World:
     return turning(world, 4.0, np.pi)
 
 
-def car(x: float, y: float = LANE_1_M, **more: Any) -> dict[str, Any]:
-    return {"x_m": x, "y_m": y, **more}
-
-
 GONE = {"present": False, "outcome": Outcome.GOAL}
 
 
@@ -79,28 +56,21 @@ def test_leader_gap__is_bumper_to_bumper(moment: Moment, world: World) -> None:
     assert q.leader_gap_m[0] == pytest.approx([25.4, np.inf])  # 30 m of centres less 2.3 m and 2.3 m
 
 
-def test_leader_gap__a_car_in_the_next_lane_is_no_leader(moment: Moment, world: World) -> None:
-    assert moment(world, [car(20.0), car(40.0, LANE_0_M)]).leader_gap_m[0].tolist() == [np.inf, np.inf]
-
-
-def test_leader_gap__a_car_partly_in_the_lane_is_a_leader(moment: Moment, world: World) -> None:
-    # lateral distance 1.7 m, less than 0.9 + 0.9 m of half widths
-    assert moment(world, [car(20.0), car(40.0, -3.3)]).leader_gap_m[0, 0] == pytest.approx(15.4)
-    assert moment(world, [car(20.0), car(40.0, -3.5)]).leader_gap_m[0, 0] == np.inf
-
-
-def test_leader_gap__uses_the_extent_of_a_car_across_the_lane(moment: Moment, world: World) -> None:
-    q = moment(world, [car(20.0), car(40.0, heading_rad=np.pi / 2)])
-    assert q.leader_gap_m[0, 0] == pytest.approx(20.0 - 2.3 - 0.9)
-
-
-def test_leader_gap__a_car_beyond_sight_is_no_leader(moment: Moment, world: World) -> None:
-    q = moment(world, [car(20.0), car(80.5)])
-    assert q.leader_gap_m[0, 0] == np.inf
-
-
-def test_leader_gap__is_never_negative(moment: Moment, world: World) -> None:
-    assert moment(world, [car(20.0), car(22.0)]).leader_gap_m[0, 0] == 0.0
+@pytest.mark.parametrize(
+    ("other", "gap_m"),
+    [
+        (car(40.0, LANE_0_M), np.inf),  # in the next lane
+        (car(40.0, -3.3), 15.4),  # partly in the lane: 1.7 m aside, less than 0.9 + 0.9 m of half widths
+        (car(40.0, -3.5), np.inf),
+        (car(40.0, heading_rad=np.pi / 2), 20.0 - 2.3 - 0.9),  # across the lane
+        (car(80.5), np.inf),  # beyond sight
+        (car(22.0), 0.0),  # never negative
+    ],
+)
+def test_leader_gap__is_that_to_a_car_in_the_way(
+    moment: Moment, world: World, other: dict[str, float], gap_m: float
+) -> None:
+    assert moment(world, [car(20.0), other]).leader_gap_m[0, 0] == pytest.approx(gap_m)
 
 
 def test_leader_gap__follows_the_bend(moment: Moment, bend: World) -> None:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -165,14 +166,8 @@ def test_rails__all_segments_within_reach_are_found(
     for k, point in enumerate(points):
         known = {tuple(each.ravel()) for each in found[k]}
         for each in segments:
-            if distance(np.array(point), np.array(each)) <= reach:
+            if shapely.LineString(each).distance(shapely.Point(point)) <= reach:
                 assert tuple(np.ravel(each)) in known
-
-
-def distance(point: FloatArray, segment: FloatArray) -> float:
-    start, span = segment[0], segment[1] - segment[0]
-    share = np.clip((point - start) @ span / max(span @ span, 1e-12), 0.0, 1.0)
-    return float(np.linalg.norm(point - start - share * span))
 
 
 def test_rails__a_point_far_away_is_no_error() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -14,12 +13,11 @@ from hypothesis import strategies as st
 from harness.game.geometry import Box
 from harness.game.observation import observe
 from harness.game.observation_layout import LAYOUT
-from harness.game.quantities import Quantities
 from harness.game.sight import NOTHING_HIDES, Hiding, box_cuts
 from harness.game.world import World
-from harness.road.scene.open_scene import OpenScene, open_scene
+from harness.road.scene.open_scene import open_scene
+from tests.support.moments import Moment, car
 
-Moment = Callable[..., Quantities]
 VAN = {"length_m": 6.5, "width_m": 2.16, "speed_mps": 0.0}
 WALKER = {"length_m": 0.5, "width_m": 0.5, "speed_mps": 1.5, "heading_rad": np.pi / 2}
 AN_OBSTACLE = Hiding(obstacles=np.array([True]))
@@ -30,17 +28,8 @@ AWAY = {"x_m": 10.0, "y_m": 1.6, "speed_mps": 0.0}
 
 
 @pytest.fixture(scope="module")
-def world(merge: OpenScene) -> World:
-    return merge.world
-
-
-@pytest.fixture(scope="module")
 def crossing(repository: Any) -> World:
     return open_scene(repository / "networks/priority_crossing").world
-
-
-def at(x_m: float, y_m: float, **more: Any) -> dict[str, Any]:
-    return {"x_m": x_m, "y_m": y_m, **more}
 
 
 @pytest.mark.parametrize(
@@ -75,8 +64,8 @@ def test_line__is_cut_by_a_turned_box() -> None:
 def test_shadow__of_a_van_widens_with_the_distance(moment: Moment, world: World, left_m: float, hidden: bool) -> None:
     """The van's near corners are 20 m ahead and 1.08 m beside: its shadow is 1.6065 m wide where the walker's nearer
     corner, 0.25 m beside its centre, is 29.75 m ahead."""
-    walker = at(90.0, -1.6 + left_m, **{**WALKER, "heading_rad": 0.0})
-    others = [walker, at(83.25, -1.6, **VAN)]
+    walker = car(90.0, -1.6 + left_m, **{**WALKER, "heading_rad": 0.0})
+    others = [walker, car(83.25, -1.6, **VAN)]
     q = moment(replace(world, hiding=AN_OBSTACLE), [EGO, AWAY], others)
     assert q.hidden[0, 0].tolist() == [False, False, hidden, False]
 
@@ -98,25 +87,25 @@ def test_body__is_hidden_by_what_is_higher_than_eyes(
     moment: Moment, world: World, hiding: Hiding, van: dict[str, Any], hidden: bool
 ) -> None:
     q = moment(
-        replace(world, hiding=hiding), [EGO, AWAY], [at(90.0, -1.6, **WALKER), {**at(83.25, -1.6, **VAN), **van}]
+        replace(world, hiding=hiding), [EGO, AWAY], [car(90.0, -1.6, **WALKER), {**car(83.25, -1.6, **VAN), **van}]
     )
     assert q.hidden[0, 0, 2] == hidden
 
 
 def test_body__is_seen_if_one_of_its_corners_is(moment: Moment, world: World) -> None:
     """A car of 4.6 m across the road reaches 2.3 m to each side: its ends stand out of the shadow, 1.6 m wide."""
-    across = at(90.0, -1.6, heading_rad=np.pi / 2)
-    assert not moment(replace(world, hiding=AN_OBSTACLE), [EGO, AWAY], [across, at(83.25, -1.6, **VAN)]).hidden.any()
+    across = car(90.0, -1.6, heading_rad=np.pi / 2)
+    assert not moment(replace(world, hiding=AN_OBSTACLE), [EGO, AWAY], [across, car(83.25, -1.6, **VAN)]).hidden.any()
 
 
 def test_wall__hides(moment: Moment, world: World) -> None:
     walls = np.array([[[75.0, -8.0], [75.0, 8.0]]])
-    q = moment(replace(world, hiding=Hiding(walls=walls)), [EGO, AWAY], [at(90.0, -1.6), at(70.0, -1.6)])
+    q = moment(replace(world, hiding=Hiding(walls=walls)), [EGO, AWAY], [car(90.0, -1.6), car(70.0, -1.6)])
     assert q.hidden[0].tolist() == [[False, False, True, False], [False, False, True, False]]
 
 
 def test_sight__is_mutual_between_players(moment: Moment, world: World) -> None:
-    q = moment(replace(world, hiding=AN_OBSTACLE), [EGO, at(90.0, -1.6)], [at(75.0, -1.6, **VAN)])
+    q = moment(replace(world, hiding=AN_OBSTACLE), [EGO, car(90.0, -1.6)], [car(75.0, -1.6, **VAN)])
     assert q.hidden[0].tolist() == [[False, True, False], [True, False, False]]
 
 
@@ -131,7 +120,7 @@ def test_sight__is_mutual_between_players(moment: Moment, world: World) -> None:
 )
 def test_unseen_body__changes_no_bit_of_the_observation(moment: Moment, world: World, **body: float) -> None:
     hiding = replace(world, hiding=AN_OBSTACLE)
-    van = at(68.0, -1.6, **VAN)
+    van = car(68.0, -1.6, **VAN)
     q = moment(hiding, [EGO, AWAY], [body, van])
     assume(q.hidden[0, 0, 2])
     without = moment(hiding, [EGO, AWAY], [{**body, "present": False}, van])

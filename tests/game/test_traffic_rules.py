@@ -5,26 +5,22 @@ The players drive east on the line y = -1.6, so their stations are their x. Cars
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from harness.game.junctions import NO_JUNCTIONS, Conflicts, Control, RightOfWay, Signal, StopLines, Streams
-from harness.game.observation import observe
-from harness.game.observation_layout import LAYOUT, in_units
-from harness.game.payoff import Payoff, Weighted
-from harness.game.payoff_terms import GROUPS
+from harness.game.junctions import NO_JUNCTIONS, Control, Signal, StopLines
 from harness.game.quantities import Quantities
 from harness.game.traffic_rules import since_change_s
 from harness.game.world import World
 from harness.road.scene.open_scene import OpenScene
+from tests.support.conflicts import CROSSING, with_conflicts
+from tests.support.moments import FAR, Moment, seen, value_of
 
-Moment = Callable[..., Quantities]
 LINE_M, LIMIT_MPS, HALF_M = 90.0, 13.89, 2.3
-FAR = {"x_m": 190.0, "y_m": -1.6}
+SIGNS = ("signal_green", "signal_yellow", "signal_red", "give_way", "stop_sign")
 
 
 def world_of(merge: OpenScene, control: Control, link: int = -1) -> World:
@@ -90,28 +86,11 @@ def test_passed_red__in_the_step_in_which_the_front_passes(
     assert at(moment, light, front_m, signal=(signal, 3.0)).passed_red_s[0].tolist() == [passed_s, -1.0]
 
 
-@pytest.mark.parametrize(
-    ("control", "passed_mps"),
-    [
-        (Control.STOP, 4.0),
-        (Control.ALL_WAY_STOP, 4.0),
-        (Control.GIVE_WAY, -1.0),
-        (Control.SIGNAL, -1.0),
-        (Control.NONE, -1.0),
-    ],
-)
-def test_passed_stop_sign__at_the_speed_of_that_step(
-    moment: Moment, merge: OpenScene, control: Control, passed_mps: float
-) -> None:
-    world = world_of(merge, control)
-    for front_m, passed in ((89.9, -1.0), (90.4, passed_mps), (91.1, -1.0)):
-        assert at(moment, world, front_m, speed_mps=4.0).rules.passed_stop_sign_mps[0].tolist() == [passed, -1.0]
-
-
-def value_of(q: Quantities, name: str, parameter: float | None) -> float:
-    """The ego's value of one term in this step."""
-    term = Weighted(name=name, weight=1.0, parameter=parameter)
-    return float(Payoff(alpha=dict.fromkeys(GROUPS, 1.0), terms=(term,), fuzzy={}).evaluate(q, 0)[name][0])
+def test_passed_stop_sign__at_the_speed_of_that_step(moment: Moment, merge: OpenScene) -> None:
+    for control in Control:
+        world, stops = world_of(merge, control), control in (Control.STOP, Control.ALL_WAY_STOP)
+        for front_m, passed in ((89.9, -1.0), (90.4, 4.0 if stops else -1.0), (91.1, -1.0)):
+            assert at(moment, world, front_m, speed_mps=4.0).rules.passed_stop_sign_mps[0].tolist() == [passed, -1.0]
 
 
 # --- permitted speed -------------------------------------------------------------------------------------------------
@@ -134,8 +113,8 @@ def test_permitted__before_a_red_light(
     moment: Moment, light: World, front_m: float, signal: Signal, permitted_mps: float
 ) -> None:
     q = at(moment, light, front_m, signal=(signal, 1.0))
-    assert q.permitted_mps[0, 0] == pytest.approx(permitted_mps)
-    assert q.permitted_mps[0, 1] == pytest.approx(LIMIT_MPS)
+    assert q.rules.permitted_mps[0, 0] == pytest.approx(permitted_mps)
+    assert q.rules.permitted_mps[0, 1] == pytest.approx(LIMIT_MPS)
 
 
 @pytest.mark.parametrize(
@@ -152,7 +131,7 @@ def test_permitted__yellow_means_stop_if_moderate_braking_is_enough(
     moment: Moment, light: World, speed_mps: float, room_m: float, stops: bool
 ) -> None:
     q = at(moment, light, LINE_M - room_m, speed_mps=speed_mps, signal=(Signal.YELLOW, 0.5))
-    assert q.permitted_mps[0, 0] == pytest.approx(min(np.sqrt(4.0 * room_m), LIMIT_MPS) if stops else LIMIT_MPS)
+    assert q.rules.permitted_mps[0, 0] == pytest.approx(min(np.sqrt(4.0 * room_m), LIMIT_MPS) if stops else LIMIT_MPS)
 
 
 @pytest.mark.parametrize("control", [Control.STOP, Control.ALL_WAY_STOP])
@@ -162,36 +141,13 @@ def test_permitted__before_a_stop_sign_ends_at_a_rolling_half_metre_per_second(
     world = world_of(merge, control)
     # sqrt(2 * 2 * 16 + 0.5^2) = sqrt(64.25)
     for front_m, permitted in ((74.0, np.sqrt(64.25)), (90.0, 0.5), (90.1, LIMIT_MPS)):
-        assert at(moment, world, front_m).permitted_mps[0, 0] == pytest.approx(permitted)
-
-
-CROSSING: Mapping[str, Any] = {
-    **dict.fromkeys(Conflicts._fields, 0),
-    "begin_m": 98.5,
-    "end_m": 101.5,
-    "crossing": True,
-    "yields": True,
-    "stop_m": LINE_M,
-    "wait_m": LINE_M,
-    "right_m": -np.inf,
-    "left_m": np.inf,
-    "own_link": -1,
-    "other_link": -1,
-    "from_m": -np.inf,
-    "until_m": np.inf,
-    "zone_m": 7.0,
-    "length_m": 3.0,
-}
+        assert at(moment, world, front_m).rules.permitted_mps[0, 0] == pytest.approx(permitted)
 
 
 def crossed(merge: OpenScene, yields: bool = True, wait_m: float = LINE_M) -> World:
     """The merge road, crossed at 100 m by a stream from the south with its stop line at y = -10."""
-    y_m = np.arange(-120.0, 20.0, 4.0)
-    samples = np.array([(100.0, y, 0.0, 1.0, 1.6, 2.0, y + 10.0) for y in y_m])
-    conflicts = Conflicts.of([{**CROSSING, "yields": yields, "wait_m": wait_m}])
-    streams = Streams.of(samples, np.zeros(len(y_m), dtype=np.int64), conflicts, players=2)
-    lines = StopLines.of([(0, LINE_M, Control.GIVE_WAY, -1)])
-    return replace(merge.world, right_of_way=RightOfWay(conflicts, streams, lines, ()))
+    row = {**CROSSING, "yields": yields, "wait_m": wait_m, "own_link": -1, "other_link": -1}
+    return with_conflicts(merge.world, row, stop_lines=[(0, LINE_M, Control.GIVE_WAY, -1)])
 
 
 def from_the_south(arrives_s: float, speed_mps: float = 10.0) -> dict[str, float]:
@@ -215,7 +171,7 @@ def test_permitted__waits_for_a_car_with_priority(
 ) -> None:
     q = at(moment, crossed(merge), front_m, others=[from_the_south(arrives_s)])
     assert q.meetings.other_s[0, 0, 2] == pytest.approx(arrives_s)
-    assert q.permitted_mps[0, 0] == pytest.approx(permitted_mps)
+    assert q.rules.permitted_mps[0, 0] == pytest.approx(permitted_mps)
 
 
 @pytest.mark.parametrize(
@@ -239,13 +195,12 @@ def test_posted__knows_signals_and_signs_and_no_other_cars(moment: Moment, merge
     q = at(moment, crossed(merge), 74.0, others=[from_the_south(3.9)])
     assert (q.rules.permitted_mps[0, 0], q.rules.posted_mps[0, 0]) == (pytest.approx(8.0), pytest.approx(LIMIT_MPS))
     q = at(moment, light, 74.0, speed_mps=11.0, signal=(Signal.RED, 1.0))
-    over = in_units(observe(q)[0, 0], q.world.actuators.max_steering_rad[0])[LAYOUT.index("over_posted_mps")]
-    assert over == pytest.approx(3.0, abs=1e-5)  # 11 m/s; 8 m/s are permitted
+    assert seen(q)["over_posted_mps"] == pytest.approx(3.0, abs=1e-5)  # 11 m/s; 8 m/s are permitted
 
 
 def test_permitted__does_not_wait_for_a_car_that_must_yield(moment: Moment, merge: OpenScene) -> None:
     q = at(moment, crossed(merge, yields=False), 74.0, others=[from_the_south(2.0)])
-    assert q.permitted_mps[0, 0] == pytest.approx(LIMIT_MPS)
+    assert q.rules.permitted_mps[0, 0] == pytest.approx(LIMIT_MPS)
 
 
 @pytest.mark.parametrize(
@@ -277,10 +232,6 @@ def test_speed_over_permitted__is_a_share_of_the_limit(moment: Moment, light: Wo
 # --- what is observed of them ----------------------------------------------------------------------------------------
 
 
-def seen(q: Quantities) -> dict[str, float]:
-    return dict(zip(LAYOUT, in_units(observe(q)[0, 0], 0.6).tolist(), strict=True))
-
-
 @pytest.mark.parametrize(
     ("signal", "name"),
     [
@@ -295,27 +246,20 @@ def test_observation__of_a_signal(moment: Moment, light: World, signal: Signal, 
     entries = seen(at(moment, light, 74.0, signal=(signal, 4.5)))
     assert entries["stop_line_m"] == pytest.approx(16.0, rel=1e-5)
     assert entries["signal_s"] == pytest.approx(4.5, rel=1e-5)
-    for each in ("signal_green", "signal_yellow", "signal_red", "give_way", "stop_sign"):
+    for each in SIGNS:
         assert entries[each] == (1.0 if each == name else 0.0)
 
 
-@pytest.mark.parametrize(
-    ("control", "name"),
-    [
-        (Control.STOP, "stop_sign"),
-        (Control.ALL_WAY_STOP, "stop_sign"),
-        (Control.GIVE_WAY, "give_way"),
-        (Control.NONE, ""),
-    ],
-)
-def test_observation__of_a_sign(moment: Moment, merge: OpenScene, control: Control, name: str) -> None:
-    world = world_of(merge, control)
-    entries = seen(at(moment, world, 74.0))
-    for each in ("signal_green", "signal_yellow", "signal_red", "give_way", "stop_sign"):
-        assert entries[each] == (1.0 if each == name else 0.0)
-    beyond = seen(at(moment, world, 91.0))
-    assert beyond["stop_line_m"] > 1e6, "no line ahead"
-    assert beyond["stop_sign"] == beyond["give_way"] == 0.0
+def test_observation__of_a_sign(moment: Moment, merge: OpenScene) -> None:
+    signs = {Control.STOP: "stop_sign", Control.ALL_WAY_STOP: "stop_sign", Control.GIVE_WAY: "give_way"}
+    for control in (*signs, Control.NONE):
+        name = signs.get(control)
+        world = world_of(merge, control)
+        entries, beyond = seen(at(moment, world, 74.0)), seen(at(moment, world, 91.0))
+        for each in SIGNS:
+            assert entries[each] == (1.0 if each == name else 0.0)
+        assert beyond["stop_line_m"] > 1e6, "no line ahead"
+        assert beyond["stop_sign"] == beyond["give_way"] == 0.0
 
 
 @pytest.mark.parametrize(("yields", "priority"), [(True, 1.0), (False, -1.0)])

@@ -56,13 +56,14 @@ def test_reading__is_what_sumo_has(tmp_path: Path, recorded: bool) -> None:
             reading = simulation.step(x, y, np.zeros((GAMES, 2)))
             found = {}
             for game, place in np.argwhere(reading.present).tolist():
-                values = (reading.x_m, reading.heading_rad, reading.speed_mps, reading.length_m)
+                assert reading.types[game, place] == "van"
+                values = (reading.x_m, reading.heading_rad, reading.speed_mps, reading.length_m, reading.width_m)
                 found[f"g{game}_{reading.names[game, place]}"] = [column[game, place] for column in values]
             for name in [each for each in libsumo.vehicle.getIDList() if not each.endswith("ego")]:
                 front_m, speed_mps = libsumo.vehicle.getPosition(name)[0], libsumo.vehicle.getSpeed(name)
                 heading = np.radians(90.0 - libsumo.vehicle.getAngle(name))
                 if recorded or front_m < 40.0 + NOTICED_M:
-                    expected = [front_m - 0.5 * VAN_M * np.cos(heading), heading, speed_mps, VAN_M]
+                    expected = [front_m - 0.5 * VAN_M * np.cos(heading), heading, speed_mps, VAN_M, 2.0]
                     assert found.pop(name) == pytest.approx(expected, abs=1e-9)
             assert all(recorded is False and name[3:] != "leaves" for name in found), "a margin of a vehicle's length"
     finally:

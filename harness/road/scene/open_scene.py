@@ -12,7 +12,7 @@ import numpy as np
 from harness.config.scene import Scene
 from harness.game.arrays import FloatArray
 from harness.game.human_factors import HumanFactors
-from harness.game.initial_state import Conditions, StartDistribution
+from harness.game.initial_state import StartDistribution
 from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles
 from harness.game.seeding import between
 from harness.game.start_range import StartRange
@@ -127,10 +127,8 @@ class OpenScene:
             steps=self.world.steps,
             step_s=self.world.step_s,
             routes=self.world.road.routes,
-            conditions=Conditions(
-                friction=varies.friction or (self.document.friction, self.document.friction),
-                limit_share=varies.speed_limit_share or (1.0, 1.0),
-            ),
+            friction=varies.friction or (self.document.friction, self.document.friction),
+            limit_share=varies.speed_limit_share or (1.0, 1.0),
             along_route_share=along_route_share,
             obstacles=self.obstacles,
         )

@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from harness.game.near_players import NearSearch, near_players
 from harness.game.state import NOTICED_M
+from harness.sumo.vehicle_reads import NearSearch, _near
 
 STEP_S, FASTEST_MPS = 0.1, 40.0
 
@@ -29,7 +29,7 @@ def look(
     table = (np.full((2, count), length_m), np.full((2, count), speed_mps), np.array([0.0, 500.0]))
     players = (np.zeros((2, 2)), np.zeros((2, 2)), np.array([[True, True], [present, False]]))
     search = NearSearch(due_in, *table, *players, FASTEST_MPS, 100, STEP_S, 50, all_vehicles)
-    near = near_players(search, np.arange(count, 2 * count), fronts)
+    near = _near(search, np.arange(count, 2 * count), fronts)
     assert (fronts[:, 1] == 0.0).all()  # without the offset of the tile
     assert (due_in[0] == 100).all()  # the other game is unchanged
     return near.tolist(), due_in[1].tolist()
