@@ -11,14 +11,13 @@ acceleration of a two-wheeler is also limited by its lean.
 
 from __future__ import annotations
 
-from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.jit import compiled
-from harness.game.state import State
+from harness.game.state import Motion, State, motion_of
 
 GRAVITY_MPS2 = 9.81
 WHEEL_CENTRE = 0.25  # gain of the wheel near its centre; at full deflection the gain is 1
@@ -90,18 +89,6 @@ def actions(
     return np.clip(np.stack((acceleration_mps2 / strongest, wheel), axis=-1), -1.0, 1.0)
 
 
-class _Motion(NamedTuple):
-    """The columns of `State` that motion changes, and the friction of the games."""
-
-    x_m: FloatArray
-    y_m: FloatArray
-    heading_rad: FloatArray
-    speed_mps: FloatArray
-    acceleration_mps2: FloatArray
-    steering_rad: FloatArray
-    friction: FloatArray
-
-
 class Requested(NamedTuple):
     """Requests of the players, [G, P], and whose are carried out."""
 
@@ -110,26 +97,21 @@ class Requested(NamedTuple):
     moving: BoolArray
 
 
-motion_of = attrgetter(*_Motion._fields)
-"""The columns of a state that motion changes, and the friction."""
-
-
 def move(state: State, requested: Requested, actuators: ActuatorLimits, step_s: float) -> None:
     """Move the players marked in `moving` by one step, in place.
 
     The steering angle follows its request at the rate of the steering rack. The grip used by the curve is not available
     to the pedals (friction circle). If the grip is too small for the curve, the car runs wide.
     """
-    _move(motion_of(state), tuple(requested), tuple(actuators), step_s)
+    _move((motion_of(state), state.friction), tuple(requested), tuple(actuators), step_s)
 
 
 @compiled
-def _move(motion: tuple[Any, ...], requests: tuple[Any, ...], limits: tuple[Any, ...], step_s: float) -> None:
-    x_m, y_m, heading_rad, speed_mps, acceleration_mps2, steering_rad, friction = motion
+def _move(cars: tuple[Any, ...], requests: tuple[Any, ...], limits: tuple[Any, ...], step_s: float) -> None:
+    (x_m, y_m, heading_rad, speed_mps, acceleration_mps2, steering_rad, _), friction = cars
     requested, actuators = Requested(*requests), ActuatorLimits(*limits)
-    moving = requested.moving
-    for g, p in np.ndindex(moving.shape):
-        if moving[g, p]:
+    for g, p in np.ndindex(requested.moving.shape):
+        if requested.moving[g, p]:
             grip = friction[g] * GRAVITY_MPS2
             rack = actuators.max_steering_rate_radps[p] * step_s
             turn = _clamped(requested.steering_rad[g, p] - steering_rad[g, p], rack)
@@ -163,16 +145,16 @@ def curvature_per_m(steering_rad: FloatArray, wheelbase_m: FloatArray) -> FloatA
 
 def lateral_acceleration_mps2(state: State, actuators: ActuatorLimits) -> FloatArray:
     """[G, P] lateral acceleration (m/s^2) at the state's steering and speed, bounded by the grip left by the pedals."""
-    return _lateral_acceleration_mps2(motion_of(state), tuple(actuators))
+    return _lateral_acceleration_mps2(motion_of(state), state.friction, tuple(actuators))
 
 
 @compiled
-def _lateral_acceleration_mps2(columns: tuple[Any, ...], limits: tuple[Any, ...]) -> FloatArray:
-    motion, actuators = _Motion(*columns), ActuatorLimits(*limits)
+def _lateral_acceleration_mps2(columns: tuple[Any, ...], friction: FloatArray, limits: tuple[Any, ...]) -> FloatArray:
+    motion, actuators = Motion(*columns), ActuatorLimits(*limits)
     lateral = np.empty(motion.speed_mps.shape)
     for g, p in np.ndindex(lateral.shape):
         curvature = curvature_per_m(motion.steering_rad[g, p], actuators.wheelbase_m[p])
-        grip = _remaining_grip(motion.friction[g] * GRAVITY_MPS2, motion.acceleration_mps2[g, p])
+        grip = _remaining_grip(friction[g] * GRAVITY_MPS2, motion.acceleration_mps2[g, p])
         sideways = min(grip, actuators.max_lateral_mps2[p])
         lateral[g, p] = _clamped(curvature * motion.speed_mps[g, p] ** 2, sideways)
     return lateral

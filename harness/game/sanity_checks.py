@@ -16,8 +16,7 @@ A training fails: its earlier steps may have the same fault, and omitting a game
 
 from __future__ import annotations
 
-from operator import attrgetter
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -26,7 +25,7 @@ from harness.game.jit import compiled
 from harness.game.observation_layout import LAYOUT
 from harness.game.quantities import Quantities
 from harness.game.roles import roles_of
-from harness.game.state import Bodies, State
+from harness.game.state import Bodies, Motion, State, motion_of
 
 ROUNDING_M = 1e-3  # rounding of positions in network coordinates, which may be millions of metres
 LANE_CHANGE_M = 6.0  # width of a wide lane, plus the swing of a car's centre
@@ -69,7 +68,7 @@ def check_step(before: State, q: Quantities, *, drove: BoolArray, payoff: FloatA
     """
     now, bodies, world = q.state, q.bodies, q.world
     fault, game, player = _first_fault(
-        (_moves(before), _moves(now)),
+        (motion_of(before), motion_of(now)),
         tuple(bodies),
         (drove, payoff, slack_m, world.actuators.max_speed_mps),
         world.step_s,
@@ -116,21 +115,6 @@ def _outside(values: FloatArray) -> int:
     return count
 
 
-class _Moves(NamedTuple):
-    """The columns of `State` that have the motion of the players."""
-
-    x_m: FloatArray
-    y_m: FloatArray
-    speed_mps: FloatArray
-    heading_rad: FloatArray
-    acceleration_mps2: FloatArray
-    steering_rad: FloatArray
-    station_m: FloatArray
-
-
-_moves = attrgetter(*_Moves._fields)
-
-
 @compiled
 def _first_fault(
     motions: tuple[tuple[Any, ...], tuple[Any, ...]],
@@ -140,7 +124,7 @@ def _first_fault(
 ) -> tuple[int, int, int]:
     """The first fault, its game and its player: the motion before and after the step, the bodies, and who drove, the
     payoffs, the tolerance and the top speeds."""
-    before, now, among = _Moves(*motions[0]), _Moves(*motions[1]), Bodies(*bodies)
+    before, now, among = Motion(*motions[0]), Motion(*motions[1]), Bodies(*bodies)
     drove, payoff, slack, max_speed_mps = step
     players = drove.shape[1]
     for g, p in np.ndindex(drove.shape):

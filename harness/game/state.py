@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,6 +22,22 @@ NOTICED_M = 120.0
 """A background vehicle farther than this from every player does not affect the game."""
 
 _RUNNING = int(Outcome.RUNNING)  # comparing arrays with an enumeration member is slow in NumPy
+
+
+class Motion(NamedTuple):
+    """The columns of `State` that motion changes, [G, P]."""
+
+    x_m: FloatArray
+    y_m: FloatArray
+    heading_rad: FloatArray
+    speed_mps: FloatArray
+    acceleration_mps2: FloatArray
+    steering_rad: FloatArray
+    station_m: FloatArray
+
+
+motion_of = attrgetter(*Motion._fields)
+"""The columns of `Motion`, of a state."""
 
 
 @dataclass

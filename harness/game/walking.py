@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from harness.game.bicycle import ActuatorLimits, Requested, curvature_per_m, motion_of
+from harness.game.bicycle import ActuatorLimits, Requested, curvature_per_m
 from harness.game.jit import compiled
-from harness.game.state import State
+from harness.game.state import State, motion_of
 
 MAX_BACKWARD_MPS = 0.5
 BACKWARD_SHARE = 0.5  # of the braking

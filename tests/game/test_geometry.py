@@ -109,21 +109,17 @@ def test_first_contact__is_the_soonest_of_those_marked() -> None:
         assert found[0, 0] == pytest.approx(seconds)
 
 
-def test_time_to_contact__is_the_gap_over_the_closing_speed() -> None:
-    # centres 24.6 m apart, less 4.6 m of car: 20 m at 5 m/s
-    assert time_to_contact(box(0, 0), box(24.6, 0), -5.0, 0.0) == pytest.approx(4.0)
-
-
-def test_time_to_contact__corner_meets_corner() -> None:
-    # 4.6 m long, 1.8 m wide, diagonally: along they overlap from (10 - 4.6) / 2 = 2.7 s to (10 + 4.6) / 2 = 7.3 s,
-    # across from (6 - 1.8) / 1 = 4.2 s to (6 + 1.8) / 1 = 7.8 s: the later of the two begins the contact
-    found = time_to_contact(box(0, 0), box(10, 6), -2.0, -1.0)
-    assert found == pytest.approx(4.2)
-
-
-@pytest.mark.parametrize("velocity", [(5.0, 0.0), (-5.0, 3.0), (0.0, 0.0), (0.0, 8.0)])
-def test_time_to_contact__of_cars_that_miss_is_never(velocity: tuple[float, float]) -> None:
-    assert time_to_contact(box(0, 0), box(24.6, 0), *velocity) == np.inf
+@pytest.mark.parametrize(
+    ("place", "velocity", "seconds"),
+    [
+        ((24.6, 0.0), (-5.0, 0.0), 4.0),  # centres 24.6 m apart, less 4.6 m of car: 20 m at 5 m/s
+        # corner meets corner: along they overlap from (10 - 4.6) / 2 = 2.7 s on, across from (6 - 1.8) / 1 = 4.2 s on
+        ((10.0, 6.0), (-2.0, -1.0), 4.2),
+        *(((24.6, 0.0), velocity, np.inf) for velocity in ((5.0, 0.0), (-5.0, 3.0), (0.0, 0.0), (0.0, 8.0))),
+    ],
+)
+def test_time_to_contact__by_hand(place: tuple[float, float], velocity: tuple[float, float], seconds: float) -> None:
+    assert time_to_contact(box(0, 0), box(*place), *velocity) == pytest.approx(seconds)
 
 
 @settings(max_examples=60, deadline=None)

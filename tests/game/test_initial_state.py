@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harness.game.human_factors import Attention, HumanFactors
+from harness.game.human_factors import Attention, HumanFactors, Reaction, Sight
 from harness.game.initial_state import InitialState, StartDistribution, draw_initial_state
 from harness.game.seeding import seed_of
 from harness.game.start_range import OnLine, StartRange
@@ -55,13 +55,19 @@ def test_start__the_same_parts_give_the_same_start(start_distribution: StartDist
 
 
 def test_start__is_paired_for_all_human_factors(start_distribution: StartDistribution) -> None:
-    texting = replace(start_distribution, human_factors=([HumanFactors()], [TEXTING]), present_share=(1.0, 0.0))
-    one, two = draw_initial_state(start_distribution, "a", 1), draw_initial_state(texting, "a", 1)
-    for name in ("x_m", "y_m", "heading_rad", "speed_mps", "position_m", "noise", "seed"):
-        assert np.array_equal(getattr(one, name), getattr(two, name))
-    assert not one.lapses[1].lapsed.any()
-    assert two.lapses[1].lapsed.any()
-    assert two.present.tolist() == [True, False]
+    """What differs in one player changes no draw of another, and no draw of its own that has other parts."""
+    late = replace(TEXTING, reaction=Reaction(delay_s=(0.2, 0.9)), sight=Sight(distance_error=0.1))
+    own, other = (replace(start_distribution, human_factors=([TEXTING], [each])) for each in (HumanFactors(), late))
+    for episode in range(5):
+        one = draw_initial_state(own, "a", episode)
+        two = draw_initial_state(replace(other, present_share=(1.0, 0.0)), "a", episode)
+        for name in ("x_m", "y_m", "heading_rad", "speed_mps", "position_m", "noise", "seed"):
+            assert np.array_equal(getattr(one, name), getattr(two, name))
+        assert np.array_equal(one.lapses[0].lapsed, two.lapses[0].lapsed)
+        assert not one.lapses[1].lapsed.any()
+        assert two.lapses[1].lapsed.any()
+        assert two.limits[1].delay_steps > 0 == one.limits[1].delay_steps
+        assert two.present.tolist() == [True, False]
 
 
 def test_start__a_share_of_the_games_has_one_player(start_distribution: StartDistribution) -> None:

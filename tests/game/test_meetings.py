@@ -42,41 +42,24 @@ def meeting(q: Quantities, body: int = 2, player: int = 0) -> Meetings:
     return Meetings(*(column[0, player, body] for column in q.meetings))
 
 
-def test_meetings__distances_are_those_of_the_front_bumpers_to_the_zone(moment: Moment, world: World) -> None:
-    met = meeting(moment(world, [ego(70.0), FAR], [northbound(-40.0)]))
+@pytest.mark.parametrize(
+    ("own", "other", "expected"),
+    [
+        # fronts at 72.3 m and y = -37.7; the player's rear leaves the zone after (101.5 - 67.7) / 20 s
+        (ego(70.0, 20.0), northbound(-40.0, 5.0), (26.2, 34.7, 1.31, 6.94, 6.94 - 33.8 / 20.0)),
+        # behind the body, whose rear leaves the zone after (10 + 2.3) / 10 s
+        (ego(50.0), northbound(-10.0), (46.2, 4.7, 4.62, 0.47, 4.62 - 1.23)),
+        (ego(70.0), northbound(-30.0), (26.2, 24.7, 2.62, 2.47, 0.0)),  # both in the zone at once
+        (ego(70.0), northbound(-20.0, 0.0), (26.2, 14.7, 2.62, np.inf, np.inf)),  # stands before it: does not arrive
+        (ego(70.0), northbound(-1.6, 0.0), (26.2, -3.7, 2.62, 0.0, 0.0)),  # stands in it: does not leave it
+    ],
+)
+def test_meetings__distances_and_times_are_those_of_the_front_bumpers_to_the_zone(
+    moment: Moment, world: World, own: dict[str, float], other: dict[str, float], expected: tuple[float, ...]
+) -> None:
+    met = meeting(moment(world, [own, FAR], [other]))
     assert met.conflict == 0
-    assert met.own_m == pytest.approx(98.5 - 72.3)
-    assert met.other_m == pytest.approx(7.0 - (-40.0 + 10.0 + 2.3))
-
-
-def test_meetings__times_at_constant_speed_and_the_gap_between_the_passages(moment: Moment, world: World) -> None:
-    met = meeting(moment(world, [ego(70.0, speed_mps=20.0), FAR], [northbound(-40.0, speed_mps=5.0)]))
-    assert met.own_s == pytest.approx(26.2 / 20.0)
-    assert met.other_s == pytest.approx(34.7 / 5.0)
-    own_leaves_s = (101.5 - 67.7) / 20.0  # when its rear bumper is out of the zone
-    assert met.gap_s == pytest.approx(34.7 / 5.0 - own_leaves_s)
-
-
-def test_meetings__the_gap_is_that_of_the_player_behind_the_body_as_well(moment: Moment, world: World) -> None:
-    met = meeting(moment(world, [ego(50.0), FAR], [northbound(-10.0)]))
-    other_leaves_s = (10.0 - (-2.3)) / 10.0
-    assert met.gap_s == pytest.approx((98.5 - 52.3) / 10.0 - other_leaves_s)
-
-
-def test_meetings__both_in_the_zone_at_once_is_no_gap(moment: Moment, world: World) -> None:
-    assert meeting(moment(world, [ego(70.0), FAR], [northbound(-30.0)])).gap_s == 0.0
-
-
-def test_meetings__a_body_that_stands_before_the_zone_does_not_arrive(moment: Moment, world: World) -> None:
-    met = meeting(moment(world, [ego(70.0), FAR], [northbound(-20.0, speed_mps=0.0)]))
-    assert (met.other_s, met.gap_s) == (np.inf, np.inf)
-    assert met.conflict == 0
-
-
-def test_meetings__a_body_that_stands_in_the_zone_does_not_leave_it(moment: Moment, world: World) -> None:
-    met = meeting(moment(world, [ego(70.0), FAR], [northbound(-1.6, speed_mps=0.0)]))
-    assert met.other_m < 0.0
-    assert (met.other_s, met.gap_s) == (0.0, 0.0)
+    assert (met.own_m, met.other_m, met.own_s, met.other_s, met.gap_s) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(
@@ -98,15 +81,19 @@ def test_meetings__no_conflict_with_a_body(moment: Moment, world: World, meaning
     assert not met.must_yield
 
 
-def test_meetings__a_body_conflicts_until_its_rear_has_left_the_zone(moment: Moment, world: World) -> None:
-    # the zone ends at y = 0: the rear leaves it when the centre is at 2.3 m
-    assert meeting(moment(world, [ego(70.0), FAR], [northbound(2.2)])).conflict == 0
-    assert meeting(moment(world, [ego(70.0), FAR], [northbound(2.4)])).conflict == -1
-
-
-def test_meetings__a_player_conflicts_until_its_rear_has_left_the_zone(moment: Moment, world: World) -> None:
-    assert meeting(moment(world, [ego(103.7), FAR], [northbound(-40.0)])).conflict == 0
-    assert meeting(moment(world, [ego(103.9), FAR], [northbound(-40.0)])).conflict == -1
+@pytest.mark.parametrize(
+    ("x_m", "y_m", "conflict"),
+    [
+        (70.0, 2.2, 0),  # the zone ends at y = 0: the body's rear leaves it when its centre is at 2.3 m
+        (70.0, 2.4, -1),
+        (103.7, -40.0, 0),  # and the player's at 103.8 m
+        (103.9, -40.0, -1),
+    ],
+)
+def test_meetings__last_until_one_has_left_the_zone(
+    moment: Moment, world: World, x_m: float, y_m: float, conflict: int
+) -> None:
+    assert meeting(moment(world, [ego(x_m), FAR], [northbound(y_m)])).conflict == conflict
 
 
 def test_meetings__players_meet_each_other(moment: Moment, merge: OpenScene) -> None:

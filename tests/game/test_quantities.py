@@ -91,13 +91,9 @@ def test_leader_gap__an_oncoming_car_beside_is_no_leader(moment: Moment, hairpin
 
 
 def test_time_gap__is_the_gap_over_own_speed(moment: Moment, world: World) -> None:
-    q = moment(world, [car(20.0, speed_mps=12.7), car(50.0, speed_mps=3.0)])
-    assert q.time_gap_s[0] == pytest.approx([2.0, np.inf])  # 25.4 / 12.7
-
-
-def test_time_gap__of_a_car_that_stands_is_finite(moment: Moment, world: World) -> None:
-    q = moment(world, [car(20.0, speed_mps=0.0), car(50.0)])
-    assert q.time_gap_s[0, 0] == pytest.approx(254.0)  # as at 0.1 m/s
+    for speed_mps, gap_s in ((12.7, 2.0), (0.0, 254.0)):  # 25.4 / 12.7; of a car that stands as at 0.1 m/s
+        q = moment(world, [car(20.0, speed_mps=speed_mps), car(50.0, speed_mps=3.0)])
+        assert q.time_gap_s[0] == pytest.approx([gap_s, np.inf])
 
 
 # --- contact ---------------------------------------------------------------------------------------------------------
@@ -140,20 +136,12 @@ def test_clearance__at_the_taper(moment: Moment, world: World) -> None:
 # --- visibility ------------------------------------------------------------------------------------------------------
 
 
-def test_visible__excludes_the_player_itself(moment: Moment, world: World) -> None:
+def test_visible__excludes_the_player_itself_and_bodies_that_are_not_present(moment: Moment, world: World) -> None:
     assert moment(world, [car(20.0), car(50.0)]).visible[0].tolist() == [[False, True], [True, False]]
-
-
-def test_visible__excludes_a_player_that_left(moment: Moment, world: World) -> None:
-    q = moment(world, [car(20.0), car(30.0, **GONE)], [car(60.0)])
-    assert q.visible[0].tolist() == [[False, False, True], [False, False, False]]
+    q = moment(world, [car(20.0), car(30.0, **GONE)], [car(60.0), car(40.0, present=False)])
+    assert q.visible[0].tolist() == [[False, False, True, False], [False] * 4]
     assert q.leader_gap_m[0].tolist() == pytest.approx([35.4, np.inf])
     assert q.vehicle_clearance_m[0, 0] == REACH_M
-
-
-def test_visible__excludes_a_background_vehicle_that_is_not_present(moment: Moment, world: World) -> None:
-    q = moment(world, [car(20.0), car(30.0, LANE_0_M)], [car(40.0, present=False)])
-    assert q.leader_gap_m[0, 0] == np.inf
 
 
 # --- route -----------------------------------------------------------------------------------------------------------

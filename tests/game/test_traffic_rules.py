@@ -134,14 +134,14 @@ def test_permitted__yellow_means_stop_if_moderate_braking_is_enough(
     assert q.rules.permitted_mps[0, 0] == pytest.approx(min(np.sqrt(4.0 * room_m), LIMIT_MPS) if stops else LIMIT_MPS)
 
 
-@pytest.mark.parametrize("control", [Control.STOP, Control.ALL_WAY_STOP])
 def test_permitted__before_a_stop_sign_ends_at_a_rolling_half_metre_per_second(
-    moment: Moment, merge: OpenScene, control: Control
+    moment: Moment, merge: OpenScene
 ) -> None:
-    world = world_of(merge, control)
-    # sqrt(2 * 2 * 16 + 0.5^2) = sqrt(64.25)
-    for front_m, permitted in ((74.0, np.sqrt(64.25)), (90.0, 0.5), (90.1, LIMIT_MPS)):
-        assert at(moment, world, front_m).rules.permitted_mps[0, 0] == pytest.approx(permitted)
+    for control in (Control.STOP, Control.ALL_WAY_STOP):
+        # sqrt(2 * 2 * 16 + 0.5^2) = sqrt(64.25)
+        for front_m, permitted in ((74.0, np.sqrt(64.25)), (90.0, 0.5), (90.1, LIMIT_MPS)):
+            found = at(moment, world_of(merge, control), front_m).rules.permitted_mps[0, 0]
+            assert found == pytest.approx(permitted)
 
 
 def crossed(merge: OpenScene, yields: bool = True, wait_m: float = LINE_M) -> World:
@@ -172,6 +172,8 @@ def test_permitted__waits_for_a_car_with_priority(
     q = at(moment, crossed(merge), front_m, others=[from_the_south(arrives_s)])
     assert q.meetings.other_s[0, 0, 2] == pytest.approx(arrives_s)
     assert q.rules.permitted_mps[0, 0] == pytest.approx(permitted_mps)
+    with_priority = at(moment, crossed(merge, yields=False), front_m, others=[from_the_south(arrives_s)])
+    assert with_priority.rules.permitted_mps[0, 0] == pytest.approx(LIMIT_MPS)
 
 
 @pytest.mark.parametrize(
@@ -196,11 +198,6 @@ def test_posted__knows_signals_and_signs_and_no_other_cars(moment: Moment, merge
     assert (q.rules.permitted_mps[0, 0], q.rules.posted_mps[0, 0]) == (pytest.approx(8.0), pytest.approx(LIMIT_MPS))
     q = at(moment, light, 74.0, speed_mps=11.0, signal=(Signal.RED, 1.0))
     assert seen(q)["over_posted_mps"] == pytest.approx(3.0, abs=1e-5)  # 11 m/s; 8 m/s are permitted
-
-
-def test_permitted__does_not_wait_for_a_car_that_must_yield(moment: Moment, merge: OpenScene) -> None:
-    q = at(moment, crossed(merge, yields=False), 74.0, others=[from_the_south(2.0)])
-    assert q.rules.permitted_mps[0, 0] == pytest.approx(LIMIT_MPS)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ ego is red for 45 s, green for 42 s and yellow for 3 s.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import libsumo
@@ -14,21 +14,19 @@ import numpy as np
 import pytest
 
 from harness.environments.arena import Arena, Seat
-from harness.game.arrays import FloatArray, IntArray
+from harness.game.arrays import IntArray
 from harness.game.initial_state import InitialState
 from harness.game.junctions import Signal
 from harness.game.roles import EGO, NON_EGO
 from harness.road.scene.open_scene import OpenScene
 from harness.sumo.libsumo_simulation import LibsumoSimulation
-from harness.sumo.simulation import Simulation
-from harness.sumo.subprocess_simulation import SubprocessSimulation
 from tests.support.scenes import CROSSING_EDGES, CROSSING_NODES, build_scene, drawn
 
 CYCLE_S, STEP_S = 90.0, 0.1
 LIGHTS = CROSSING_NODES.replace('id="c" x="0" y="0" type="priority"', 'id="c" x="0" y="0" type="traffic_light"')
 GREEN, YELLOW, RED = int(Signal.GREEN), int(Signal.YELLOW), int(Signal.RED)
 CODES = {"G": GREEN, "y": YELLOW, "r": RED}
-Open = Callable[..., Simulation]
+Open = Callable[..., LibsumoSimulation]
 
 
 @pytest.fixture(scope="module")
@@ -40,13 +38,11 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
 
 @pytest.fixture
 def opened(scene: OpenScene) -> Iterator[Open]:
-    """Opens simulations of both kinds, and closes them."""
-    simulations: list[Simulation] = []
+    """Opens simulations, and closes them."""
+    simulations: list[LibsumoSimulation] = []
 
-    def opened(
-        kind: type[LibsumoSimulation] | type[SubprocessSimulation] = LibsumoSimulation, games: int = 1
-    ) -> Simulation:
-        simulations.append(kind(scene, games, (True, True), 1))
+    def opened(games: int = 1) -> LibsumoSimulation:
+        simulations.append(LibsumoSimulation(scene, games, (True, True), 1))
         return simulations[-1]
 
     yield opened
@@ -69,7 +65,7 @@ def column(scene: OpenScene, player: int) -> int:
     return int(lines.link[lines.player.tolist().index(player)])
 
 
-def read(simulation: Simulation, start: InitialState, steps: int) -> IntArray:
+def read(simulation: LibsumoSimulation, start: InitialState, steps: int) -> IntArray:
     """[T, L] the states of a single game's links in each step; the cars stand."""
     poses = [np.array([column]) for column in (start.x_m, start.y_m, start.heading_rad)]
     states = [simulation.step(*poses).signals for _ in range(steps)]
@@ -135,53 +131,23 @@ def test_reset__a_game_does_not_move_the_lights_of_the_others(scene: OpenScene, 
     assert states[1, column(scene, NON_EGO)] == GREEN  # at 20 s; it was yellow at 43 s
 
 
-# --- many games, and a child process ---------------------------------------------------------------------------------
-
-
-def played(scene: OpenScene, starts: Sequence[InitialState], steps: int) -> tuple[IntArray, FloatArray]:
-    """[T + 1, G, L] states of the links and seconds since they changed, of games that are played together."""
-    arena = Arena(scene, len(starts), [Seat(None), Seat(None)], seed=1)
+def test_arena__seconds_since_the_change_count_from_it(scene: OpenScene) -> None:
+    arena = Arena(scene, 1, [Seat(None), Seat(None)], seed=1)
     try:
-        arena.reset(dict(enumerate(starts)))
-        states, since_s = [arena.state.signals.copy()], [arena.state.signal_s.copy()]
-        for _ in range(steps):
-            arena.step(np.tile([-1.0, 0.0], (len(starts), 2, 1)))
-            states.append(arena.state.signals.copy())
-            since_s.append(arena.state.signal_s.copy())
-        return np.array(states), np.array(since_s)
+        arena.reset({0: starting(scene, seconds(41.0)[0])})
+        columns = [(arena.state.signals.copy(), arena.state.signal_s.copy())]
+        for _ in range(60):
+            arena.step(np.tile([-1.0, 0.0], (1, 2, 1)))
+            columns.append((arena.state.signals.copy(), arena.state.signal_s.copy()))
     finally:
         arena.close()
-
-
-def test_games__together_have_the_signals_that_each_has_alone(scene: OpenScene) -> None:
-    starts = [starting(scene, share) for share in seconds(5.0, 40.0, 44.0, 83.0)]
-    together = played(scene, starts, 60)
-    for game, start in enumerate(starts):
-        alone = played(scene, [start], 60)
-        assert (together[0][:, game] == alone[0][:, 0]).all()
-        assert together[1][:, game] == pytest.approx(alone[1][:, 0])
-    assert len(np.unique(together[0][0], axis=0)) > 1, "the games start at different places in the cycle"
-
-
-def test_arena__seconds_since_the_change_count_from_it(scene: OpenScene) -> None:
-    states, since_s = played(scene, [starting(scene, seconds(41.0)[0])], 60)
+    states, since_s = map(np.array, zip(*columns, strict=True))
     own = column(scene, NON_EGO)
     changed = np.flatnonzero(np.diff(states[:, 0, own]))
     assert changed.tolist() == [10, 40]  # yellow after 1 s, red after 4 s, each in the step that begins then
     assert since_s[:11, 0, own] == pytest.approx(41.0 + STEP_S * np.arange(11))
     assert since_s[11:41, 0, own] == pytest.approx(STEP_S * np.arange(30))
     assert since_s[41:, 0, own] == pytest.approx(STEP_S * np.arange(20))
-
-
-def test_child_process__has_the_same_signals(scene: OpenScene, opened: Open) -> None:
-    here, there = opened(), opened(SubprocessSimulation)
-    for share in seconds(30.0, 44.5, 88.0):
-        start = starting(scene, share)
-        one, two = here.reset(0, start, []), there.reset(0, start, [])
-        assert one.states.tolist() == two.states.tolist()
-        assert one.since_s.tolist() == two.since_s.tolist()
-        assert one.text == two.text
-        assert (read(here, start, 30) == read(there, start, 30)).all()
 
 
 # --- the draw --------------------------------------------------------------------------------------------------------
