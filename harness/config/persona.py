@@ -11,9 +11,8 @@ from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 from harness.config.human_limits import AttentionLapses, CarUse, Perception, ReactionTime
 from harness.config.scene import Name
 from harness.config.toml_reading import NUMBER, TABLE, Document, Mistakes, nearest
-from harness.game.fuzzy import FuzzyFunction, FuzzySet
 from harness.game.human_factors import ActuatorShares, Attention, HumanFactors, Reaction, Sight
-from harness.game.payoff import Payoff, Weighted
+from harness.game.payoff import FuzzyFunction, FuzzySet, Payoff, Weighted
 from harness.game.payoff_terms import FUZZY_QUANTITIES, GROUPS, NEARNESS, TERMS
 
 Weight = Annotated[float, Field(ge=0.0, le=1000.0)]

@@ -36,7 +36,7 @@ from harness.game.observation import observe
 from harness.game.observation_layout import SIZE
 from harness.game.outcome import Outcome
 from harness.game.quantities import Quantities
-from harness.game.sanity_checks import check_observation, check_step, checked_decisions, slack_m
+from harness.game.sanity_checks import check_observation, check_step, checked_decisions
 from harness.game.state import State, terminations
 from harness.game.traffic_rules import since_change_s
 from harness.game.walking import walk
@@ -103,7 +103,6 @@ class Arena(LiveSimulation):
         self._learns = np.array([driver is None for driver in first_drivers])
         self._taken_over = np.array([driver is None or driver.takes_over for driver in first_drivers])
         self._on_wheels = self._taken_over & ~self.world.walks
-        self._slack_m = slack_m(self._taken_over)
         self.simulation = simulation or open_simulation(
             scene, games, taken_over=self._taken_over.tolist(), seed=seed, recorded=recorded
         )
@@ -179,7 +178,7 @@ class Arena(LiveSimulation):
         distances_m = (quantities.goal_m, quantities.vehicle_clearance_m, quantities.rail_clearance_m)
         terminations(state.outcome, drove, (self._taken_over, state.step >= world.steps), distances_m)
         payoff = self._payoffs(quantities, drove)
-        check_step(before, quantities, drove=drove, payoff=payoff, slack_m=self._slack_m)
+        check_step(before, quantities, drove=drove, payoff=payoff, taken_over=self._taken_over)
         self._finish(quantities, drove)
         check_observation(self.observation, self._all_games, state.step)
         return Step(payoff=payoff, drove=drove, quantities=quantities)

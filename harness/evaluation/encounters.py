@@ -10,8 +10,15 @@ import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.junctions import RightOfWay, Signal
-from harness.game.meetings import STANDING_MPS, has_duty
-from harness.game.passages import Passage, Places, other_passage, own_passage, places
+from harness.game.meetings import (
+    STANDING_MPS,
+    Passage,
+    Places,
+    has_duty,
+    other_passage,
+    own_passage,
+    places,
+)
 from harness.game.quantities import Quantities
 
 

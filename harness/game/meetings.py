@@ -1,4 +1,7 @@
-"""The players' conflicts with other bodies at junctions: distances, times, and the duty to yield."""
+"""The players' conflicts with other bodies at junctions: distances, times, and the duty to yield.
+
+In a recorded game, whose axis of games is that of steps, [T], also when bodies passed the zones of conflict.
+"""
 
 from __future__ import annotations
 
@@ -119,22 +122,22 @@ def _meeting(
     own_m = conflicts[found, _BEGIN_M] - player.front_m
     own_end_m = conflicts[found, _END_M] - player.front_m + player.length_m
     other_end_m = other_m + conflicts[found, _LENGTH_M] + 2.0 * body.half_m
-    own = _passage_s(own_m, own_end_m, player.speed_mps)
-    other = _passage_s(other_m, other_end_m, body.speed_mps)
+    own_s, own_leaves_s = _passage_s(own_m, own_end_m, player.speed_mps)
+    other_s, other_leaves_s = _passage_s(other_m, other_end_m, body.speed_mps)
     waits_inside = conflicts[found, _WAIT_M] > conflicts[found, _STOP_M]
     moves_up = waits_inside and player.speed_mps**2 < 2.0 * COMFORTABLE_MPS2 * own_m  # it can stop in comfort
-    if moves_up or own[0] == np.inf or other[0] == np.inf:
+    if moves_up or own_s == np.inf or other_s == np.inf:
         gap_s = np.inf
     else:
-        gap_s = max(other[0] - own[1], own[0] - other[1], 0.0)
+        gap_s = max(other_s - own_leaves_s, own_s - other_leaves_s, 0.0)
     # a signal counts for a side that has not passed its stop line
     own_signal, other_signal = _OFF, _OFF
     if conflicts[found, _OWN_LINK] >= 0 and player.front_m <= conflicts[found, _STOP_M] and len(signals):
         own_signal = signals[int(conflicts[found, _OWN_LINK])]
     if conflicts[found, _OTHER_LINK] >= 0 and conflicts[found, _ZONE_M] - other_m <= 0.0 and len(signals):
         other_signal = signals[int(conflicts[found, _OTHER_LINK])]
-    yields = has_duty(conflicts[found], own_signal, other_signal, other[0] <= own[0])
-    return found, (own_m, other_m, own[0], other[0], gap_s), yields
+    yields = has_duty(conflicts[found], own_signal, other_signal, other_s <= own_s)
+    return found, (own_m, other_m, own_s, other_s, gap_s), yields
 
 
 @compiled
@@ -220,3 +223,88 @@ def has_duty(conflict: FloatArray, own: int, other: int, other_first: bool) -> b
     if conflict[_FIRST_COME] > 0.0:
         return other_first
     return conflict[_YIELDS] > 0.0
+
+
+# --- passages of zones in a recorded game ----------------------------------------------------------------------------
+
+
+class Places(NamedTuple):
+    """The streams in which bodies drive, one row for each step, body and stream, [N]."""
+
+    step: IntArray
+    body: IntArray
+    stream: IntArray
+    along_m: FloatArray  # of the body's centre, from the stream's stop line
+
+
+class Passage(NamedTuple):
+    """A body's passage of a zone, in seconds since the start of the game."""
+
+    enters_s: float  # its front
+    leaves_s: float  # its rear; inf if it does not
+
+
+@compiled
+def places(columns: tuple[Any, ...], table: tuple[Any, ...]) -> tuple[IntArray, IntArray, IntArray, FloatArray]:
+    """The columns of `Places`, of bodies [T, B] in the table of streams."""
+    among, streams = Bodies(*columns), Streams(*table)
+    along_m = np.empty(streams.first_conflict.shape[1])
+    in_streams = np.empty(len(along_m), dtype=np.int64)
+    steps, bodies, found, along = [0], [0], [0], [0.0]  # numba infers the types of lists from their entries
+    for t, b in np.ndindex(among.present.shape):
+        if among.present[t, b]:
+            pose = (among.x_m[t, b], among.y_m[t, b], among.heading_rad[t, b])
+            count = streams_at(pose, streams, in_streams, along_m)
+            for k in range(count):
+                steps.append(t)
+                bodies.append(b)
+                found.append(in_streams[k])
+                along.append(along_m[in_streams[k]])
+    return np.array(steps)[1:], np.array(bodies)[1:], np.array(found)[1:], np.array(along)[1:]
+
+
+def own_passage(
+    front_m: FloatArray, speed_mps: FloatArray, zone_m: tuple[float, float], *, length_m: float, step_s: float
+) -> Passage | None:
+    """A player's passage of a zone, given by the stations of its ends, from the station of the player's front and its
+    speed [T]; None if it does not enter."""
+    begin_m, end_m = zone_m
+    inside = np.flatnonzero((front_m >= begin_m) & (front_m - length_m <= end_m))
+    if not len(inside):
+        return None
+    first = int(inside[0])
+    after = first + np.flatnonzero(front_m[first:] - length_m > end_m)
+    enters_s = _reached_s(first, front_m[first] - begin_m, speed_mps[first], step_s)
+    if not len(after):
+        return Passage(enters_s, np.inf)
+    return Passage(enters_s, _reached_s(after[0], front_m[after[0]] - length_m - end_m, speed_mps[after[0]], step_s))
+
+
+def other_passage(
+    at: IntArray,
+    along_m: FloatArray,
+    speed_mps: FloatArray,
+    zone_m: tuple[float, float],
+    *,
+    length_m: float,
+    step_s: float,
+) -> Passage | None:
+    """A body's passage of a zone, given by its ends along the stream, from the body's places along the stream and its
+    speed in the steps `at` [N]; None if it does not enter.
+
+    A body that joins the player's way leaves the stream inside the zone: the rest of the zone counts at its last speed.
+    """
+    front_m, rear_m = along_m + 0.5 * length_m, along_m - 0.5 * length_m
+    begin_m, end_m = zone_m
+    inside = np.flatnonzero((front_m >= begin_m) & (rear_m <= end_m))
+    if not len(inside):
+        return None
+    first, last = inside[0], inside[-1]
+    moves = speed_mps[last] > STANDING_MPS
+    leaves_s = at[last] * step_s + (end_m - rear_m[last]) / speed_mps[last] if moves else np.inf
+    return Passage(_reached_s(at[first], front_m[first] - begin_m, speed_mps[first], step_s), float(leaves_s))
+
+
+def _reached_s(step: int, beyond_m: float, speed_mps: float, step_s: float) -> float:
+    """When a place was reached that a body was beyond by `beyond_m` at a step: during the step before."""
+    return float(step * step_s - min(beyond_m / max(speed_mps, STANDING_MPS), step_s if step else 0.0))

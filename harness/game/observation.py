@@ -138,7 +138,8 @@ def _observe(tables: tuple[tuple[Any, ...], ...]) -> FloatArray:
             eye = _eye(players, views, place, (g, p))
             view[:] = 0.0
             _see_own_motion(view, eye, players, views)
-            _see_own_side(view, eye, routes)
+            view[OWN.own_side_left_m] = routes.own_left_m[place.row] - place.offset_m
+            view[OWN.own_side_right_m] = routes.own_right_m[place.row] - place.offset_m
             for k in range(_COUNT):
                 _see_road(view, k, eye, routes)
             if views.next_line[g, p] < 0:
@@ -237,13 +238,6 @@ def _see_own_motion(view: FloatArray, eye: _Eye, players: _Players, views: _View
     view[OWN.steering_rad] = players.steering_rad[g, p] / views.max_steering_rad[p]
     view[OWN.road_steering_rad] = views.road_steering_rad[g, p] / views.max_steering_rad[p]
     view[OWN.lane_end_m], view[OWN.goal_m] = views.lane_end_m[g, p], views.goal_m[g, p]
-
-
-@inlined
-def _see_own_side(view: FloatArray, eye: _Eye, routes: Routes) -> None:
-    """Write the entries of the path and of the own side of the road beside the player."""
-    view[OWN.own_side_left_m] = routes.own_left_m[eye.place.row] - eye.place.offset_m
-    view[OWN.own_side_right_m] = routes.own_right_m[eye.place.row] - eye.place.offset_m
     view[OWN.path_left_m] = -eye.place.offset_m
 
 

@@ -37,11 +37,6 @@ class ImpossibleNumber(FloatingPointError):
     """A number of the game is invalid."""
 
 
-def slack_m(taken_over: BoolArray) -> FloatArray:
-    """[P] tolerance (m) of the distance that a player moves in a step."""
-    return np.where(taken_over, ROUNDING_M, LANE_CHANGE_M)
-
-
 def checked_decisions(decided: Any, driver: str, games: IntArray, steps: IntArray) -> FloatArray:
     """The decisions of a driver for games [N], as an array [N, 2]. `driver` names it, `steps` [G] are the steps played
     so far. Raises ImpossibleNumber unless the decisions are N pairs of numbers from -1 to 1."""
@@ -61,16 +56,16 @@ def checked_decisions(decided: Any, driver: str, games: IntArray, steps: IntArra
     return actions
 
 
-def check_step(before: State, q: Quantities, *, drove: BoolArray, payoff: FloatArray, slack_m: FloatArray) -> None:
+def check_step(before: State, q: Quantities, *, drove: BoolArray, payoff: FloatArray, taken_over: BoolArray) -> None:
     """Check the result of a step: the players that drove [G, P], payoffs [G, P], and the bodies near them.
 
-    `slack_m` [P] is the result of `slack_m`. Raises ImpossibleNumber for the first fault.
+    taken_over [P] are the players that the harness moves. Raises ImpossibleNumber for the first fault.
     """
     now, bodies, world = q.state, q.bodies, q.world
     fault, game, player = _first_fault(
         (motion_of(before), motion_of(now)),
         tuple(bodies),
-        (drove, payoff, slack_m, world.actuators.max_speed_mps),
+        (drove, payoff, taken_over, world.actuators.max_speed_mps),
         world.step_s,
     )
     if fault == _NO_FAULT:
@@ -119,13 +114,13 @@ def _outside(values: FloatArray) -> int:
 def _first_fault(
     motions: tuple[tuple[Any, ...], tuple[Any, ...]],
     bodies: tuple[Any, ...],
-    step: tuple[BoolArray, FloatArray, FloatArray, FloatArray],
+    step: tuple[BoolArray, FloatArray, BoolArray, FloatArray],
     step_s: float,
 ) -> tuple[int, int, int]:
-    """The first fault, its game and its player: the motion before and after the step, the bodies, and who drove, the
-    payoffs, the tolerance and the top speeds."""
+    """The first fault, its game and its player, from the motion before and after the step, the bodies, and the players
+    that drove, payoffs, the players that the harness moves, and top speeds."""
     before, now, among = Motion(*motions[0]), Motion(*motions[1]), Bodies(*bodies)
-    drove, payoff, slack, max_speed_mps = step
+    drove, payoff, taken_over, max_speed_mps = step
     players = drove.shape[1]
     for g, p in np.ndindex(drove.shape):
         if drove[g, p]:
@@ -134,7 +129,7 @@ def _first_fault(
                     return _MOTION, g, p
             speed = min(max(abs(before.speed_mps[g, p]), abs(now.speed_mps[g, p])), max_speed_mps[p])  # or backwards
             moved_m = np.hypot(now.x_m[g, p] - before.x_m[g, p], now.y_m[g, p] - before.y_m[g, p])
-            if not moved_m <= speed * step_s + slack[p]:
+            if not moved_m <= speed * step_s + (ROUNDING_M if taken_over[p] else LANE_CHANGE_M):
                 return _MOVED, g, p
         if p == 0:  # the players of a game have the same bodies
             for b in range(players, among.present.shape[1]):

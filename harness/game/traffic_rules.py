@@ -49,10 +49,10 @@ def rules(
     """
     (station_m, advanced_m, speed_mps, approach_mps, length_m), (signals, signal_s) = players, links
     lines, conflicts, meetings = StopLines(*tables[0]), Conflicts(*tables[1]), Meetings(*tables[2])
-    next_line, numbers = np.full(station_m.shape, -1), np.full((5, *station_m.shape), -1.0)
+    next_line, numbers = np.full(station_m.shape, -1), np.empty((5, *station_m.shape))
     for g, p in np.ndindex(station_m.shape):
         front_m, speed, permitted_mps = station_m[g, p] + 0.5 * length_m[p], speed_mps[g, p], approach_mps[g, p]
-        waits = False
+        waits, passed_red_s, passed_stop_sign_mps = False, -1.0, -1.0
         for line in range(len(lines.player)):  # sorted by player and station
             if lines.player[line] != p:
                 continue
@@ -66,10 +66,10 @@ def rules(
                 break
             if front_m - advanced_m[g, p] <= place_m:  # passed in this step
                 if signal == _RED:
-                    numbers[3, g, p] = signal_s[g, link]
+                    passed_red_s = signal_s[g, link]
                 if control in (_STOP, _ALL_WAY_STOP):
-                    numbers[4, g, p] = speed
-        numbers[2, g, p] = permitted_mps
+                    passed_stop_sign_mps = speed
+        posted_mps = permitted_mps
         for b in range(meetings.conflict.shape[2]):
             conflict = meetings.conflict[g, p, b]
             if conflict >= 0 and meetings.must_yield[g, p, b] and meetings.other_s[g, p, b] < YIELDS_WITHIN_S:
@@ -81,7 +81,9 @@ def rules(
                 if room_m >= 0.0:
                     waits = waits or room_m < within_m
                     permitted_mps = min(permitted_mps, _braking_mps(room_m))
-        numbers[0, g, p], numbers[1, g, p] = permitted_mps, 0.0 if waits else permitted_mps
+        due_mps = 0.0 if waits else permitted_mps
+        for k, number in enumerate((permitted_mps, due_mps, posted_mps, passed_red_s, passed_stop_sign_mps)):
+            numbers[k, g, p] = number
     return next_line, numbers
 
 
@@ -102,10 +104,6 @@ def _braking_mps(room_m: float) -> float:
     return np.sqrt(2.0 * COMFORTABLE_MPS2 * room_m)
 
 
-@compiled
 def since_change_s(before: IntArray, now: IntArray, since_s: FloatArray, step_s: float) -> FloatArray:
     """[G, L] seconds since the signals changed, from their states in the step before and now, and the seconds then."""
-    seconds = np.empty(since_s.shape)
-    for g, link in np.ndindex(now.shape):
-        seconds[g, link] = since_s[g, link] + step_s if now[g, link] == before[g, link] else 0.0
-    return seconds
+    return np.where(now == before, since_s + step_s, 0.0)

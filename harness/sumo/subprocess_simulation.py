@@ -1,8 +1,8 @@
 """A simulation in a child process, used if libsumo of this process is in use: one message each way per call.
 
 The child runs this module as a program. A user's script therefore does not have to be importable. The child's standard
-input and output carry pickles, each preceded by its length; they are trusted, because the child is our own. Output that
-SUMO prints goes to standard error. The child ends at the end of its input, and so with its parent.
+input and output carry pickles; they are trusted, because the child is our own. Output that SUMO prints goes to standard
+error. The child ends at the end of its input, and so with its parent.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import contextlib
 import os
 import pickle
 import signal
-import struct
 import subprocess
 import sys
 import weakref
@@ -45,7 +44,6 @@ def open_simulation(
     return kind(scene, games, taken_over, seed, recorded=recorded)
 
 
-_LENGTH = struct.Struct("<Q")
 _PATIENCE_S = 10.0  # time limit for a child to end
 
 
@@ -98,7 +96,7 @@ class SubprocessSimulation(Simulation):
         try:
             _send(self._child.stdin, message)
             answer, refusal = _receive(self._child.stdout)
-        except (EOFError, OSError):
+        except (EOFError, OSError, pickle.UnpicklingError):
             raise SimulationError(f"SUMO's process {_ending_of(self._child)}") from None
         except BaseException:
             self._child.kill()
@@ -147,22 +145,13 @@ def _ending_of(child: subprocess.Popen[bytes]) -> str:
 
 
 def _send(stream: IO[bytes], message: Any) -> None:
-    content = pickle.dumps(message, pickle.HIGHEST_PROTOCOL)
-    stream.write(_LENGTH.pack(len(content)) + content)
+    pickle.dump(message, stream, pickle.HIGHEST_PROTOCOL)
     stream.flush()
 
 
 def _receive(stream: IO[bytes]) -> Any:
-    """The next message. Raises EOFError at the end of the stream."""
-    (length,) = _LENGTH.unpack(_read(stream, _LENGTH.size))
-    return pickle.loads(_read(stream, length))
-
-
-def _read(stream: IO[bytes], count: int) -> bytes:
-    content = stream.read(count)
-    if len(content) < count:
-        raise EOFError
-    return content
+    """The next message. Raises EOFError at the end of the stream, UnpicklingError if it ends within a message."""
+    return pickle.load(stream)
 
 
 # --- in the child -----------------------------------------------------------------------------------------------------
@@ -176,7 +165,8 @@ def serve() -> None:
     outgoing = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     simulation: LibsumoSimulation | None = None
-    with contextlib.suppress(EOFError, BrokenPipeError):  # the parent has closed this simulation, or has ended
+    # the parent has closed this simulation, or has ended
+    with contextlib.suppress(EOFError, BrokenPipeError, pickle.UnpicklingError):
         while True:
             first, *arguments = _receive(incoming)
             result, refusal = None, None

@@ -21,26 +21,33 @@ from harness.game.bicycle import (
 from harness.game.state import State
 from tests.support.bicycle import STEP_S, actuators, advance, state_of
 
-GRIP_MPS2 = 0.8 * GRAVITY_MPS2
+Numbers = tuple[float, float]
 
 
-@pytest.mark.parametrize(("acceleration", "speed"), [(2.0, 10.2), (-5.0, 9.5), (0.0, 10.0)])
-def test_drive__displacement_on_the_straight_is_the_new_speed_times_the_step(acceleration: float, speed: float) -> None:
-    state = state_of(10.0)
-    advance(state, acceleration, 0.0)
-    assert state.speed_mps[0, 0] == pytest.approx(speed)
-    assert state.x_m[0, 0] == pytest.approx(speed * 0.1)
-    assert state.y_m[0, 0] == 0.0
-    assert state.heading_rad[0, 0] == 0.0
-    assert state.acceleration_mps2[0, 0] == pytest.approx(acceleration)
-
-
-@pytest.mark.parametrize(("requested", "actual"), [(9.0, 3.0), (-20.0, -7.848)])
-def test_drive__pedals_are_bounded_by_engine_and_grip(requested: float, actual: float) -> None:
-    # the brakes allow 8 m/s2, the tyres 0.8 * 9.81 = 7.848 m/s2
-    state = state_of(10.0)
-    advance(state, requested, 0.0)
-    assert state.acceleration_mps2[0, 0] == pytest.approx(actual)
+@pytest.mark.parametrize(
+    ("start", "requested", "expected"),
+    [
+        # a displacement is the new speed times the step
+        ((10.0, 0.0), (2.0, 0.0), {"speed_mps": 10.2, "x_m": 1.02, "acceleration_mps2": 2.0}),
+        ((10.0, 0.0), (-5.0, 0.0), {"speed_mps": 9.5, "x_m": 0.95, "y_m": 0.0, "heading_rad": 0.0}),
+        ((10.0, 0.0), (9.0, 0.0), {"acceleration_mps2": 3.0}),  # the engine
+        ((10.0, 0.0), (-20.0, 0.0), {"acceleration_mps2": -7.848}),  # the brakes have 8 m/s2, the tyres 0.8 * 9.81
+        # to a stand and not backwards: 0.3 m/s in 0.1 s are the whole speed
+        ((0.3, 0.0), (-8.0, 0.0), {"speed_mps": 0.0, "x_m": 0.0, "acceleration_mps2": -3.0}),
+        ((2.0, 0.0), (0.0, 0.6), {"steering_rad": 0.08}),  # the rack: 0.8 rad/s for 0.1 s
+        ((2.0, 0.08), (0.0, -0.6), {"steering_rad": 0.0}),
+        # too fast for the curve the car runs wide: 20 m/s and 0.3 rad would need 0.1132 /m * 400 = 45 m/s2; the tyres
+        # give 7.848 = 0.01962 /m * 400, and nothing is left for the engine
+        ((20.0, 0.3), (3.0, 0.3), {"heading_rad": 7.848 / 20.0 * STEP_S, "acceleration_mps2": 0.0}),
+    ],
+)
+def test_drive__one_step(
+    start: tuple[float, float], requested: tuple[float, float], expected: dict[str, float]
+) -> None:
+    """From a speed and a steering angle, with an acceleration and a steering angle requested."""
+    state = state_of(start[0], steering_rad=start[1])
+    advance(state, *requested)
+    assert {name: getattr(state, name)[0, 0] for name in expected} == pytest.approx(expected)
 
 
 def test_drive__one_step_of_a_turn_agrees_with_a_hand_calculation() -> None:
@@ -70,36 +77,12 @@ def test_drive__a_full_circle_has_the_radius_of_its_curvature() -> None:
     assert np.hypot(*(np.array(points) - centre).T) == pytest.approx(radius, rel=0.02)
 
 
-def test_drive__wheels_turn_no_faster_than_the_rack() -> None:
-    state = state_of(2.0)
-    advance(state, 0.0, 0.6)
-    assert state.steering_rad[0, 0] == pytest.approx(0.08)  # 0.8 rad/s for 0.1 s
-    advance(state, 0.0, -0.6)
-    assert state.steering_rad[0, 0] == pytest.approx(0.0)
-
-
-def test_drive__too_fast_for_the_curve_the_car_runs_wide() -> None:
-    # 20 m/s and 0.3 rad would need 0.1132 /m * 400 = 45 m/s2; the tyres give 7.848 = 0.01962 /m * 400
-    state = state_of(20.0, steering_rad=0.3)
-    advance(state, 3.0, 0.3)
-    assert state.heading_rad[0, 0] == pytest.approx(7.848 / 20.0 * STEP_S)
-    assert state.acceleration_mps2[0, 0] == 0.0  # no grip is left for the engine
-
-
 def test_drive__on_ice_the_grip_is_that_of_the_game() -> None:
     # 0.1 * 9.81 = 0.981 m/s2 for the brakes, in one game; the other has the friction of a dry road
     state = State.empty(2, 1)
     state.speed_mps[:], state.friction[:] = 10.0, [0.1, 0.8]
     move(state, Requested(np.full((2, 1), -8.0), np.zeros((2, 1)), np.ones((2, 1), dtype=bool)), actuators(), STEP_S)
     assert state.acceleration_mps2[:, 0] == pytest.approx([-0.981, -7.848])
-
-
-def test_drive__brakes_to_a_stand_and_not_backwards() -> None:
-    state = state_of(0.3)
-    advance(state, -8.0, 0.0)
-    assert state.speed_mps[0, 0] == 0.0
-    assert state.x_m[0, 0] == 0.0
-    assert state.acceleration_mps2[0, 0] == pytest.approx(-3.0)  # 0.3 m/s in 0.1 s: the whole speed
 
 
 def test_drive__players_that_do_not_move_are_untouched() -> None:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from harness.game.fuzzy import FuzzyFunction, FuzzySet
+from harness.game.payoff import FuzzyFunction, FuzzySet
 
 # speed over the limit as a share of it: legal up to 0, thrilling between 0.05 and 0.3, frightening beyond 0.5
 LEGAL = FuzzySet(name="legal", inputs=(0.0, 0.1), memberships=(1.0, 0.0), value=0.0)

@@ -13,9 +13,8 @@ import pytest
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.errors import UsageError
-from harness.game.fuzzy import FuzzyFunction, FuzzySet
 from harness.game.outcome import Outcome
-from harness.game.payoff import Payoff, Weighted
+from harness.game.payoff import FuzzyFunction, FuzzySet, Payoff, Weighted
 from harness.game.payoff_terms import TERMS
 from harness.game.quantities import Quantities
 from harness.game.world import World

@@ -27,11 +27,10 @@ from harness.errors import StageFailed, UsageError
 from harness.evaluation.measured_game import METRICS_OF_PLAYERS
 from harness.evaluation.metrics import Metric
 from harness.game.arrays import FloatArray, IntArray
-from harness.game.fuzzy import FuzzyFunction, FuzzySet
 from harness.game.observation import observe
 from harness.game.observation_layout import LAYOUT
 from harness.game.outcome import Outcome
-from harness.game.payoff import Payoff, Weighted
+from harness.game.payoff import FuzzyFunction, FuzzySet, Payoff, Weighted
 from harness.game.payoff_terms import FUZZY_QUANTITIES, GROUPS, TERMS
 from harness.game.quantities import Quantities
 from harness.game.roles import EGO, NON_EGO, ROLES

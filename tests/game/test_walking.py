@@ -28,17 +28,12 @@ def step_on(state: State, acceleration_mps2: float, steering_rad: float = 0.0, s
     return state
 
 
-def test_walk__starts_at_the_limit_of_acceleration() -> None:
+def test_walk__starts_at_the_limit_of_acceleration_and_stands_while_it_brakes_gently() -> None:
     state = step_on(state_of(0.0), 9.0)
-    assert state.speed_mps[0, 0] == pytest.approx(0.23)  # 2.3 m/s2 for 0.1 s
-    assert state.x_m[0, 0] == pytest.approx(0.023)
-    assert state.acceleration_mps2[0, 0] == pytest.approx(2.3)
-
-
-def test_walk__stops_and_stands_while_it_brakes_gently() -> None:
+    found = (state.speed_mps[0, 0], state.x_m[0, 0], state.acceleration_mps2[0, 0])
+    assert found == pytest.approx((0.23, 0.023, 2.3))  # 2.3 m/s2 for 0.1 s
     state = step_on(state_of(0.1), -1.1, steps=5)  # less than half of 2.3 m/s2
-    assert state.speed_mps[0, 0] == 0.0
-    assert state.x_m[0, 0] == 0.0
+    assert (state.speed_mps[0, 0], state.x_m[0, 0]) == (0.0, 0.0)
 
 
 def test_walk__steps_back_from_a_stand_slowly_when_it_brakes_hard() -> None:
