@@ -17,7 +17,7 @@ import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.jit import compiled
-from harness.game.state import Motion, State, motion_of
+from harness.game.state import PlayersMotion, State, motion_of
 
 GRAVITY_MPS2 = 9.81
 WHEEL_CENTRE = 0.25  # gain of the wheel near its centre; at full deflection the gain is 1
@@ -150,7 +150,7 @@ def lateral_acceleration_mps2(state: State, actuators: ActuatorLimits) -> FloatA
 
 @compiled
 def _lateral_acceleration_mps2(columns: tuple[Any, ...], friction: FloatArray, limits: tuple[Any, ...]) -> FloatArray:
-    motion, actuators = Motion(*columns), ActuatorLimits(*limits)
+    motion, actuators = PlayersMotion(*columns), ActuatorLimits(*limits)
     lateral = np.empty(motion.speed_mps.shape)
     for g, p in np.ndindex(lateral.shape):
         curvature = curvature_per_m(motion.steering_rad[g, p], actuators.wheelbase_m[p])

@@ -25,7 +25,7 @@ from harness.game.jit import compiled
 from harness.game.observation_layout import LAYOUT
 from harness.game.quantities import Quantities
 from harness.game.roles import roles_of
-from harness.game.state import Bodies, Motion, State, motion_of
+from harness.game.state import Bodies, PlayersMotion, State, motion_of
 
 ROUNDING_M = 1e-3  # rounding of positions in network coordinates, which may be millions of metres
 LANE_CHANGE_M = 6.0  # width of a wide lane, plus the swing of a car's centre
@@ -119,7 +119,7 @@ def _first_fault(
 ) -> tuple[int, int, int]:
     """The first fault, its game and its player, from the motion before and after the step, the bodies, and the players
     that drove, payoffs, the players that the harness moves, and top speeds."""
-    before, now, among = Motion(*motions[0]), Motion(*motions[1]), Bodies(*bodies)
+    before, now, among = PlayersMotion(*motions[0]), PlayersMotion(*motions[1]), Bodies(*bodies)
     drove, payoff, taken_over, max_speed_mps = step
     players = drove.shape[1]
     for g, p in np.ndindex(drove.shape):

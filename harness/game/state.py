@@ -24,7 +24,7 @@ NOTICED_M = 120.0
 _RUNNING = int(Outcome.RUNNING)  # comparing arrays with an enumeration member is slow in NumPy
 
 
-class Motion(NamedTuple):
+class PlayersMotion(NamedTuple):
     """The columns of `State` that motion changes, [G, P]."""
 
     x_m: FloatArray
@@ -36,8 +36,8 @@ class Motion(NamedTuple):
     station_m: FloatArray
 
 
-motion_of = attrgetter(*Motion._fields)
-"""The columns of `Motion`, of a state."""
+motion_of = attrgetter(*PlayersMotion._fields)
+"""The columns of `PlayersMotion`, of a state."""
 
 
 @dataclass
