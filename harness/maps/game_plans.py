@@ -15,7 +15,7 @@ from harness.game.arrays import FloatArray
 from harness.game.road import SPACING_M
 from harness.maps.candidates import Candidate, CandidateKind, LaneWay, candidates, following
 from harness.maps.planned_routes import PlannedRoute, following_m, meeting_near, planned_route, sampled_to, way_over
-from harness.road.net.meeting import meeting_of_lines
+from harness.road.net.route_table import meeting_of_lines
 
 Range = tuple[float, float]
 

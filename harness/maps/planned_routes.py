@@ -16,9 +16,8 @@ from sumolib.net.lane import Lane
 from harness.game.arrays import FloatArray
 from harness.game.road import SPACING_M
 from harness.maps.candidates import Candidate, LaneWay, for_cars
-from harness.road.net.meeting import Meeting, meeting_of_lines
 from harness.road.net.network import lane_line
-from harness.road.net.route_table import route_line
+from harness.road.net.route_table import Meeting, meeting_of_lines, route_line
 
 BEYOND_M = 45.0  # of the goal behind the junction
 _ROOM_M = 8.0  # behind a goal, at the end of the last edge

@@ -13,8 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from harness.errors import UsageError
-from harness.road.demand.flows import FlowRate, times_of
-from harness.road.demand.route_file import Departure, Flow, RouteFile, VehicleType
+from harness.road.demand.route_file import Departure, Flow, FlowRate, RouteFile, VehicleType, times_of
 from harness.road.demand.route_reading import read_route_file
 
 Write = Callable[[str], Path]

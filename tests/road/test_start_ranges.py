@@ -17,7 +17,7 @@ from harness.errors import UsageError
 from harness.game.initial_state import InitialState
 from harness.game.start_range import ArrivesAfterEgo, OnLine, StartRange
 from harness.road.net import network
-from harness.road.net.meeting import meeting
+from harness.road.net.route_table import meeting
 from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.roads import arc, straight
 from tests.support.scenes import CARS, CROSSING_EDGES, CROSSING_NODES, build_scene, drawn

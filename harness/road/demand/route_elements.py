@@ -10,11 +10,11 @@ from xml.etree import ElementTree
 
 from harness.config.toml_reading import nearest
 from harness.errors import Problem, UsageError, collect
-from harness.road.demand.flows import LEAST_PERIOD_S
 from harness.road.demand.route_file import (
     CAR_SIZE_M,
     DEFAULT_TYPE,
     DESIRED_SPEEDS_MPS,
+    LEAST_PERIOD_S,
     SIZES_M,
     Mix,
     RouteChoice,

@@ -13,16 +13,18 @@ import numpy as np
 
 from harness.config.toml_reading import nearest
 from harness.errors import Problem, UsageError, collect
-from harness.road.demand.flows import LEAST_PERIOD_S, MOST_AT_ONCE, FlowRate
 from harness.road.demand.route_elements import NamedRoutes, Types, choices_in, ranged, read_routes, read_types, route_in
 from harness.road.demand.route_file import (
     DEFAULT_PERSONS_TYPE,
     DEFAULT_TYPE,
     DESIRED_SPEEDS_MPS,
+    LEAST_PERIOD_S,
+    MOST_AT_ONCE,
     PLACES,
     SIZES_M,
     Departure,
     Flow,
+    FlowRate,
     RouteChoice,
     RouteFile,
     VehicleType,

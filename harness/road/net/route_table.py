@@ -1,4 +1,4 @@
-"""The game's table of a SUMO route: its line, and the lanes and edges of the road at every station.
+"""The game's table of a SUMO route, its line with the lanes and edges of the road at every station, and where two meet.
 
 The line follows the lanes that lead to the route's end. If a route has to change lanes on an edge, its line moves over
 gradually. If a net has no lanes inside a junction, a curve replaces them.
@@ -24,6 +24,7 @@ from harness.road.net.own_lanes import LanesOf, own_side
 
 _FAR_SIDE_M = 50.0
 _ON_POINT_M = 0.1
+_MEETS_M = 1.6  # routes whose lines are closer than half a lane meet
 _FEW_POINTS, _AT_ONCE = 400, 100  # of an area that is cut as a whole; stations otherwise
 
 
@@ -46,6 +47,14 @@ class JunctionOnRoute:
     links: list[Connection]  # all that cars may take from the one edge to the other
     begin_m: float  # stations of the route's line
     end_m: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Meeting:
+    """The first place along the ego's route where another player's route meets it, in metres along both."""
+
+    ego_m: float
+    other_m: float
 
 
 def junctions_on_route(net: Net, edges: Sequence[Edge], lanes_of: LanesOf = car_lanes) -> list[JunctionOnRoute]:
@@ -280,3 +289,32 @@ def extended(values: FloatArray, inside: FloatArray) -> FloatArray:
     rows = np.flatnonzero(inside)
     first, last = rows[0] + 1, rows[-1] - 1
     return values[np.clip(np.arange(len(values)), first, last)]
+
+
+# --- where two routes meet -------------------------------------------------------------------------------------------
+
+
+def meeting(ego: Route, other: Route) -> Meeting | None:
+    """The first place where the routes, up to their goals, meet; None if they do not."""
+    ego_points, other_points = (route_points(route)[: round(route.goal_m / SPACING_M) + 1] for route in (ego, other))
+    return meeting_of_lines(ego_points, other_points)
+
+
+def meeting_of_lines(ego_points: FloatArray, other_points: FloatArray) -> Meeting | None:
+    """The first place where two lines, of points [n, 2] every `SPACING_M`, meet; None if they do not."""
+    from scipy.spatial import KDTree  # loads SciPy's sparse matrices: only for commands that open a scene
+
+    distances, rows = KDTree(other_points).query(ego_points)
+    near = np.flatnonzero(distances < _MEETS_M)
+    if not len(near):
+        return None
+    first = near[0]
+    last = first + int(np.argmin(np.append(distances[first:] < _MEETS_M, False)))
+    closest = first + int(np.flatnonzero(distances[first:last] <= distances[first:last].min() + 0.1)[0])
+    return Meeting(ego_m=float(closest * SPACING_M), other_m=float(rows[closest] * SPACING_M))
+
+
+def route_points(route: Route) -> FloatArray:
+    """[n, 2] the line of a route, every `SPACING_M` from its station 0."""
+    first = round(MARGIN_M / SPACING_M)
+    return np.stack((route.x_m[first:-first], route.y_m[first:-first]), axis=1)

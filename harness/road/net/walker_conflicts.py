@@ -21,9 +21,8 @@ from harness.config.scene import Scene
 from harness.game.arrays import FloatArray
 from harness.game.junctions import KERB_M, Conflicts, Control, RightOfWay, StopLines, Streams
 from harness.game.road import Route
-from harness.road.net.meeting import route_points
 from harness.road.net.network import lane_line
-from harness.road.net.route_table import line_over_junction
+from harness.road.net.route_table import line_over_junction, route_points
 from harness.road.net.stream import CORRIDOR_M, USERS, Feeders, Piece, Stream, carries_traffic, samples_on
 
 WALKERS_STREAM_M = 3.0

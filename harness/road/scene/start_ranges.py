@@ -17,7 +17,7 @@ from harness.game.road import SPACING_M, Route
 from harness.game.start_range import ArrivesAfterEgo, BesideEgo, OnLine, StartRange
 from harness.game.world import World
 from harness.road.net import network
-from harness.road.net.meeting import meeting, route_points
+from harness.road.net.route_table import meeting, route_points
 from harness.road.scene.open_obstacles import boxes_of
 from harness.road.scene.scene_files import SceneFiles
 
