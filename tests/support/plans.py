@@ -37,11 +37,11 @@ def stages_of(*personas: str, tunable: bool = False, **changes: Any) -> dict[str
     return {stage.name: stage for stage in plan(campaign_of(*personas, **changes), personas, tunable)}
 
 
-def training_of(name: str, *needs: str) -> Stage:
+def training_of(name: str, *needs: str, seed: int = 1) -> Stage:
     """A training that needs others: as its initial policy and as its opponent."""
-    needed = tuple(Trained(stage=f"{each}-seed1") for each in needs)
+    needed = tuple(Trained(stage=f"{each}-seed{seed}") for each in needs)
     return TrainingStage(
-        seed=1,
+        seed=seed,
         persona="",
         strategy=PersonaNonEgo(persona=name),
         opponent=needed[1:],

@@ -105,58 +105,43 @@ def test_arm__a_game_that_is_given_up_is_an_error_and_the_others_are_played(
     assert [episode for episode, _ in read_traces(tmp_path / "traces.parquet")] == [0, 1, 2, 3, 5, 6]
 
 
-class FailsOnce(Steady):
-    """Raises in its fifth game."""
+class Raises(Steady):
+    """Raises in some of the games that it plays, which are counted from 1."""
 
-    games = 0
+    def __init__(self, raising: Callable[[int], bool]) -> None:
+        super().__init__()
+        self.games, self._raising = 0, raising
 
     def reset(self, games: IntArray) -> None:
         self.games += 1
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
-        if self.games == 5:
-            raise RuntimeError("out of ideas")
+        if self._raising(self.games):
+            raise RuntimeError(f"out of ideas after {self.games * 1.5} s")
         return super().decide(games, observation, noise)
 
 
 def test_arm__only_segments_with_errors_are_played_again_by_the_next_run(
     merge: OpenScene, whole: Path, tmp_path: Path
 ) -> None:
-    forgetful = arm(merge, FailsOnce(), SumoDriver())
+    forgetful = arm(merge, Raises(lambda game: game == 5), SumoDriver())
     assert play(forgetful, tmp_path) == (1, list(range(EPISODES)))
     assert play(forgetful, tmp_path, AGAIN) == (1, [])  # within a run, errors stay
     assert play(forgetful, tmp_path) == (0, [3, 4, 5])
     assert files(tmp_path) == files(whole)
 
 
-class NeverDecides(Steady):
-    """Raises in every game, or in every game but one."""
-
-    def __init__(self, but: int = -1) -> None:
-        super().__init__()
-        self.but, self.games = but, 0
-
-    def reset(self, games: IntArray) -> None:
-        self.games += 1
-
-    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
-        if self.games - 1 == self.but:
-            return super().decide(games, observation, noise)
-        raise RuntimeError(f"out of ideas after {self.games * 1.5} s")
-
-
-def play_ten(driver: Steady, scene: OpenScene, folder: Path, keep_going: bool = False) -> int:
-    segments = segments_of(folder / "segments", 12)
-    run = StageRun(context=replace(empty_context(folder), keep_going=keep_going))
-    return play_segments(arm(scene, driver, SumoDriver()), segments, LABELS, run)
-
-
 def test_arm__ends_if_its_first_ten_games_fail_for_one_reason(merge: OpenScene, tmp_path: Path) -> None:
+    def errors(driver: Raises, folder: Path, keep_going: bool = False) -> int:
+        run = StageRun(context=replace(empty_context(folder), keep_going=keep_going))
+        return play_segments(arm(merge, driver, SumoDriver()), segments_of(folder / "segments", 12), LABELS, run)
+
+    never = Raises(lambda game: True)
     with pytest.raises(StageFailed, match=r"none of its first 10 games .*--keep-going.*RuntimeError: out of ideas"):
-        play_ten(driver := NeverDecides(), merge, tmp_path)
-    assert driver.games == 10
-    assert play_ten(NeverDecides(), merge, tmp_path, keep_going=True) == 12
-    assert play_ten(NeverDecides(but=9), merge, tmp_path / "one") == 11
+        errors(never, tmp_path)
+    assert never.games == 10
+    assert errors(Raises(lambda game: True), tmp_path, keep_going=True) == 12
+    assert errors(Raises(lambda game: game != 10), tmp_path / "one") == 11
 
 
 @pytest.mark.parametrize("name", ["json", PLAYED, "traces.parquet"])

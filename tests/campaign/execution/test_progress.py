@@ -35,25 +35,16 @@ def shown(*events: Event, terminal: bool) -> list[str]:
     return printed.getvalue().splitlines()
 
 
-def row(*events: Event) -> str:
-    (line,) = (line for line in shown(*events, terminal=True) if NAIVE in line)
-    return line
-
-
-def test_terminal__a_stage_has_a_row_from_its_start() -> None:
-    assert STARTING in row(STARTED)
-
-
-def test_terminal__the_row_names_what_is_prepared_and_how_far_it_is() -> None:
-    assert "2/3" in row(STARTED, *MERGING)
-    assert "merging" in row(STARTED, *MERGING)
-
-
-def test_terminal__its_own_work_replaces_what_was_prepared() -> None:
-    line = row(STARTED, *MERGING, STEP)
-    assert "2048/4096" in line
-    assert "steps" in line
-    assert "merging" not in line
+@pytest.mark.parametrize(
+    ("events", "words"),
+    [([], [STARTING]), (MERGING, ["merging", "2/3"]), ([*MERGING, STEP], ["2048/4096", "steps"])],
+)
+def test_terminal__the_row_of_a_stage_says_what_it_is_waiting_for_and_then_its_own_work(
+    events: list[Event], words: list[str]
+) -> None:
+    (row,) = (line for line in shown(STARTED, *events, terminal=True) if NAIVE in line)
+    assert all(word in row for word in words)
+    assert ("merging" in row) == ("merging" in words)
 
 
 def test_elsewhere__each_preparation_is_one_line() -> None:

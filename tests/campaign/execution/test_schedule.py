@@ -5,19 +5,8 @@ from __future__ import annotations
 import pytest
 
 from harness.campaign.execution.schedule import Schedule
-from harness.campaign.plan.planned_drivers import Trained
-from harness.campaign.plan.stages import Stage, TrainingStage
 from harness.errors import PlanError
-from harness.evaluation.strategies import PersonaNonEgo
-
-
-def stage(name: str, *needs: str, seed: int = 1) -> Stage:
-    """A training that needs up to two others: as its initial policy and as its opponent."""
-    initial, *opponent = [*(Trained(stage=f"{each}-seed{seed}") for each in needs), None, None]
-    strategy = PersonaNonEgo(persona=name)
-    return TrainingStage(
-        seed=seed, persona=name, strategy=strategy, opponent=tuple(opponent), initial=initial, alone_share=0.0
-    )
+from tests.support.plans import training_of as stage
 
 
 def carried_out(schedule: Schedule) -> list[str]:

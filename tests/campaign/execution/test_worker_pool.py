@@ -36,10 +36,9 @@ from tests.support.tiny import (
 )
 
 
-def run(folder: Path, stages: list[Stage], work: Any, jobs: int = 2, finished: tuple[str, ...] = ()) -> list[Event]:
+def run(folder: Path, stages: list[Stage], work: Any, jobs: int = 2) -> list[Event]:
     events: list[Event] = []
-    workers = WorkerPool(empty_context(folder), len(stages) - len(finished), jobs, work)
-    run_stages(stages, [f"{name}-seed1" for name in finished], workers, events.append)
+    run_stages(stages, [], WorkerPool(empty_context(folder), len(stages), jobs, work), events.append)
     return events
 
 
@@ -110,12 +109,6 @@ def test_run_stages__each_after_what_it_needs(tmp_path: Path) -> None:
     assert len(pids) <= 2
     assert all(event.info["deaf"] for event in events if event.kind == "done")
     assert not workers_of(os.getpid())
-
-
-def test_run_stages__what_is_finished_is_not_done_again(tmp_path: Path) -> None:
-    events = run(tmp_path, [stage("a"), stage("b", "a")], note, finished=("a",))
-    assert told(events, "done") == ["b"]
-    assert run(tmp_path, [stage("a")], note, finished=("a",)) == []
 
 
 def test_run_stages__progress_is_told_but_not_all_of_it(tmp_path: Path) -> None:
