@@ -27,8 +27,7 @@ from harness.campaign.execution import run_campaign as campaign_module
 from harness.campaign.execution.cache_keys import stage_keys
 from harness.campaign.execution.run_stage import carry_out
 from harness.campaign.execution.schedule import Schedule
-from harness.campaign.execution.stage_events import Event
-from harness.campaign.execution.stage_run import StageRun, run_context_of
+from harness.campaign.execution.stage_run import Event, StageRun, run_context_of
 from harness.campaign.execution.worker_pool import WorkerPool
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import Stage, TrainingStage

@@ -17,8 +17,7 @@ from benchmarks.budget import Budget
 from benchmarks.campaign import write_document
 from benchmarks.figures import Measured
 from benchmarks.sides import LapTimer, OnProgress, Side, raw_numbers, running_sides
-from harness.campaign.execution.ray_cluster import ray_cluster
-from harness.campaign.execution.ray_workers import RayWorkers
+from harness.campaign.execution.ray_workers import RayWorkers, ray_cluster
 from harness.campaign.execution.run_campaign import run_campaign
 from harness.campaign.execution.run_stages import StartWorkers
 from harness.campaign.execution.worker_pool import WorkerPool

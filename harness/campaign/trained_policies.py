@@ -34,7 +34,12 @@ def find_policies(file: Path, written: str | None, exist: bool = True) -> Path |
     folder = find_document(written, file.parent, "policies")
     check_no_archive(file, "policies", written, folder)
     if exist and not os.path.isdir(folder):
-        remedy = f"name one laid out as <run>/policies/; {_folders_beside(folder)}"
+        beside = f"there is no folder {folder.parent}"
+        if os.path.isdir(folder.parent):
+            beside = nearest(
+                folder.name, [each.name for each in folder.parent.iterdir() if each.is_dir()] or ["(no folder)"]
+            )
+        remedy = f"name one laid out as <run>/policies/; {beside}"
         raise UsageError.of(file, "policies", f"{written!r}: there is no such folder", remedy)
     return folder
 
@@ -104,13 +109,6 @@ def _problems_of(
     if persona is not None and card.get("persona_sha256") != persona_hash(persona):
         message = f"was learned by {name!r} with another payoff or limits than the campaign's {persona.name!r} has"
         yield Problem(str(folder), "persona_sha256", message, "train it again, or use the persona it was trained with")
-
-
-def _folders_beside(folder: Path) -> str:
-    """The folders that exist where one is missing."""
-    if not os.path.isdir(folder.parent):
-        return f"there is no folder {folder.parent}"
-    return nearest(folder.name, [each.name for each in folder.parent.iterdir() if each.is_dir()] or ["(no folder)"])
 
 
 def _alternatives(missing: str, available: Iterable[str]) -> str:

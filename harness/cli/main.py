@@ -187,8 +187,7 @@ def _started_on(ray: str | None, jobs: int | None, warn: Callable[[str], None]) 
     if ray is None:
         yield partial(WorkerPool, jobs=jobs or cores())
         return
-    from harness.campaign.execution.ray_cluster import ray_cluster
-    from harness.campaign.execution.ray_workers import RayWorkers
+    from harness.campaign.execution.ray_workers import RayWorkers, ray_cluster
 
     with ray_cluster(ray, jobs) as cluster:
         yield partial(RayWorkers, ray=cluster, jobs=jobs, warn=warn)

@@ -17,9 +17,9 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from harness.campaign.execution.crash_retries import MOST_CRASHES
 from harness.campaign.execution.run_campaign import run_campaign
 from harness.campaign.execution.run_stage import carry_out
+from harness.campaign.execution.run_stages import MOST_CRASHES
 from harness.campaign.execution.stage_run import StageRun, Work
 from harness.campaign.execution.worker_pool import WorkerPool
 from harness.campaign.plan.stages import Stage

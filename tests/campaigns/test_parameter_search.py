@@ -18,8 +18,7 @@ import pytest
 from harness.campaign.execution.cache_keys import stage_keys
 from harness.campaign.plan.paper_rounds import questions
 from harness.campaign.plan.plan import plan
-from harness.campaign.plan.planned_drivers import Reconfigured
-from harness.campaign.plan.stages import AssessmentStage, SearchStage, TrainingStage
+from harness.campaign.plan.stages import AssessmentStage, Reconfigured, SearchStage, TrainingStage
 from harness.campaign.preflight import QUICK_TRIALS, open_campaign
 from harness.config.driver import read_driver
 from harness.evaluation.tables import read_csv

@@ -12,12 +12,9 @@ from typing import Any
 
 import pytest
 
-from harness.campaign.execution.crash_retries import MOST_CRASHES
-from harness.campaign.execution.ray_cluster import ray_cluster
-from harness.campaign.execution.ray_workers import RayWorkers
-from harness.campaign.execution.run_stages import run_stages
-from harness.campaign.execution.stage_events import Event
-from harness.campaign.execution.stage_run import StageRun
+from harness.campaign.execution.ray_workers import RayWorkers, ray_cluster
+from harness.campaign.execution.run_stages import MOST_CRASHES, run_stages
+from harness.campaign.execution.stage_run import Event, StageRun
 from harness.campaign.plan.stages import Stage
 from harness.campaign.storage.run_folder import RunFolder
 from harness.cli.messages import INTERRUPTED

@@ -13,7 +13,7 @@ from tests.support.repository import REPOSITORY
 pytestmark = pytest.mark.slow
 
 PROGRAM = """
-from harness.campaign.execution.ray_cluster import ray_cluster
+from harness.campaign.execution.ray_workers import ray_cluster
 
 def play():
     import sys

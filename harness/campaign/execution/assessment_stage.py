@@ -47,7 +47,6 @@ class Segment:
     episodes: range
 
     def file(self, name: str) -> Path:
-        """One of its files."""
         return self.folder / f"{self.episodes[0]:06d}-{self.episodes[-1]:06d}.{name}"
 
     def errors(self) -> int | None:
@@ -96,7 +95,6 @@ def carry_out_assessment(stage: AssessmentStage, run: StageRun, scene: OpenScene
 
 
 def segments_of(folder: Path, episodes: int) -> list[Segment]:
-    """The segments of an arm with this number of games."""
     firsts = range(0, episodes, SEGMENT_EPISODES)
     return [Segment(folder, range(first, min(first + SEGMENT_EPISODES, episodes))) for first in firsts]
 

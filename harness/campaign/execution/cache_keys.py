@@ -11,8 +11,16 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from harness.campaign.plan.planned_drivers import BestOf, External, members_of, persona_of
-from harness.campaign.plan.stages import PreventabilityStage, SearchStage, Stage, TrainingStage
+from harness.campaign.plan.stages import (
+    BestOf,
+    External,
+    PreventabilityStage,
+    SearchStage,
+    Stage,
+    TrainingStage,
+    members_of,
+    persona_of,
+)
 from harness.campaign.plan.strategy_stages import training_settings
 from harness.campaign.preflight import OpenCampaign
 from harness.drivers.policy_file import policy_files
@@ -36,7 +44,11 @@ def stage_keys(campaign: OpenCampaign, stages: Sequence[Stage]) -> dict[str, str
 def _inputs(campaign: OpenCampaign, stage: Stage) -> dict[str, Any]:
     """What one stage's numbers depend on, beside the scene and other stages."""
     document = campaign.document
-    inputs: dict[str, Any] = {"stage": repr(stage), "personas": _personas(campaign, stage)}
+    personas = {"": campaign.ego_persona, **{each.name: each for each in campaign.personas}}
+    own = [stage.persona] if stage.persona in personas else []
+    players = members_of(*(stage.opponent if isinstance(stage, TrainingStage | SearchStage) else stage.drivers))
+    names = dict.fromkeys(["", *own, *map(persona_of, players)])
+    inputs: dict[str, Any] = {"stage": repr(stage), "personas": [personas[name].record() for name in names]}
     match stage:
         case TrainingStage():
             inputs["training"] = training_settings(document, stage).record()
@@ -62,12 +74,3 @@ def _inputs(campaign: OpenCampaign, stage: Stage) -> dict[str, Any]:
         inputs["significance"] = document.assessment.significance
         inputs["competence"] = document.competence.record()
     return inputs
-
-
-def _personas(campaign: OpenCampaign, stage: Stage) -> list[Any]:
-    """The documents of the ego's persona, the stage's own, and those of its drivers, each once."""
-    personas = {"": campaign.ego_persona, **{each.name: each for each in campaign.personas}}
-    own = [stage.persona] if stage.persona in personas else []
-    players = stage.opponent if isinstance(stage, TrainingStage | SearchStage) else stage.drivers
-    names = ["", *own, *map(persona_of, members_of(*players))]
-    return [personas[name].record() for name in dict.fromkeys(names)]

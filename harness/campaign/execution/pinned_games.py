@@ -45,8 +45,6 @@ _MOST_STARTS = 12  # starts of other episodes that are tried until one does not 
 
 @dataclass(frozen=True, kw_only=True)
 class RunFailure:
-    """A failed game of a run."""
-
     arm: str
     seed: int
     episode: int

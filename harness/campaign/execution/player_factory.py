@@ -10,7 +10,8 @@ import numpy as np
 
 from harness.assessment.rollout import SeatedArm, assess
 from harness.campaign.execution.stage_run import RunContext
-from harness.campaign.plan.planned_drivers import (
+from harness.campaign.plan.stages import (
+    AssessmentStage,
     BestOf,
     EquilibriumMixture,
     External,
@@ -26,7 +27,6 @@ from harness.campaign.plan.planned_drivers import (
     driver_in,
     persona_of,
 )
-from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.storage.arm_tables import arm_tables
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.driver import read_driver

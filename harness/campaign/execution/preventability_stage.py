@@ -18,8 +18,7 @@ from harness.assessment.conflict_replay import ConflictReplay, collision_of
 from harness.assessment.rollout import assess
 from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import StageRun
-from harness.campaign.plan.planned_drivers import SumoDriven
-from harness.campaign.plan.stages import PreventabilityStage
+from harness.campaign.plan.stages import PreventabilityStage, SumoDriven
 from harness.campaign.storage.arm_tables import arm_tables
 from harness.campaign.storage.checksums import read_checksums, write_checksums
 from harness.campaign.storage.run_folder import JUDGED

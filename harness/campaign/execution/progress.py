@@ -23,7 +23,7 @@ from rich.progress import (
 )
 from rich.text import Text
 
-from harness.campaign.execution.stage_events import Event
+from harness.campaign.execution.stage_run import Event
 from harness.campaign.plan.stages import Stage
 
 STARTING = "starting"
@@ -74,7 +74,6 @@ class StageProgress:
         self.bars.stop()
 
     def show(self, event: Event) -> None:
-        """Show an event."""
         if event.kind == "progress":
             self._show_progress(event)
         if event.kind == "started":

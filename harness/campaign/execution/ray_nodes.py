@@ -28,8 +28,6 @@ _LOCKS = "mount the file system with locks (NFS without local_lock and nolock, L
 
 @dataclass(kw_only=True)
 class Node:
-    """A node, and what runs on it."""
-
     id: str
     name: str
     """Its address, or the name that `ray start --node-name` gave it."""
@@ -77,7 +75,6 @@ class Nodes:
 
     @property
     def waiting(self) -> bool:
-        """Whether checks have not ended."""
         return bool(self._checks)
 
     def _start_check(self, node: Node) -> None:

@@ -13,8 +13,7 @@ from harness.campaign.execution.progress import StageProgress, event_line
 from harness.campaign.execution.repeat_check import CHECKING as REPEATING
 from harness.campaign.execution.repeat_check import varying_drivers
 from harness.campaign.execution.run_stages import StartWorkers, run_stages
-from harness.campaign.execution.stage_events import Event
-from harness.campaign.execution.stage_run import run_context_of
+from harness.campaign.execution.stage_run import Event, run_context_of
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import Stage
 from harness.campaign.preflight import OpenCampaign

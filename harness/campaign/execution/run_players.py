@@ -10,7 +10,8 @@ from pathlib import Path, PurePosixPath
 from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import RunContext
 from harness.campaign.plan.plan import plan
-from harness.campaign.plan.planned_drivers import (
+from harness.campaign.plan.stages import (
+    AssessmentStage,
     BestOf,
     EquilibriumMixture,
     External,
@@ -22,7 +23,6 @@ from harness.campaign.plan.planned_drivers import (
     driver_in,
     persona_of,
 )
-from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.storage.manifest import is_tuned
 from harness.campaign.storage.run_folder import MANIFEST, RunFolder
 from harness.config.campaign import Campaign

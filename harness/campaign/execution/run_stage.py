@@ -78,30 +78,29 @@ def _make(stage: Stage, run: StageRun, scene: OpenScene) -> tuple[dict[str, Any]
 
 def equilibrium_before(stage: Stage, folder: RunFolder, significance: float) -> EquilibriumGate | None:
     """The first gate of a stage whose pair is an approximate equilibrium; None if the stage has to be carried out."""
-    return next((gate for gate in stage.gates if _is_equilibrium(gate, stage, folder, significance)), None)
+    for gate in stage.gates:
+        import pandas as pd  # slow to import, and few stages have gates
 
+        from harness.campaign.storage.arm_tables import arm_tables
+        from harness.evaluation.game_theory.best_response_gap import Response, Role, gaps, nothing_to_gain
 
-def _is_equilibrium(gate: EquilibriumGate, stage: Stage, folder: RunFolder, significance: float) -> bool:
-    import pandas as pd  # slow to import, and few stages have gates
-
-    from harness.campaign.storage.arm_tables import arm_tables
-    from harness.evaluation.game_theory.best_response_gap import Response, Role, gaps, nothing_to_gain
-
-    episodes = pd.concat([arm_tables(folder, each).episodes for each in gate.stages], ignore_index=True)
-    pair, *responses = (str(name) for name in episodes["arm"].unique()[:3])
-    roles: tuple[Role, Role] = ("ego", "non_ego")
-    asked = [
-        Response(
-            seed=stage.seed,
-            role=role,
-            persona=stage.persona,
-            round=0,
-            pair_arm=pair,
-            response_arm=arm,
-            ego="",
-            non_ego="",
-            alone=gate.bounds,
-        )
-        for role, arm in zip(roles, responses, strict=True)
-    ]
-    return nothing_to_gain(gaps(asked, episodes, significance))
+        episodes = pd.concat([arm_tables(folder, each).episodes for each in gate.stages], ignore_index=True)
+        pair, *responses = (str(name) for name in episodes["arm"].unique()[:3])
+        roles: tuple[Role, Role] = ("ego", "non_ego")
+        asked = [
+            Response(
+                seed=stage.seed,
+                role=role,
+                persona=stage.persona,
+                round=0,
+                pair_arm=pair,
+                response_arm=arm,
+                ego="",
+                non_ego="",
+                alone=gate.bounds,
+            )
+            for role, arm in zip(roles, responses, strict=True)
+        ]
+        if nothing_to_gain(gaps(asked, episodes, significance)):
+            return gate
+    return None

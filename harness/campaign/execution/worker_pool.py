@@ -20,8 +20,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 
 from harness.campaign.execution.run_stage import carry_out
-from harness.campaign.execution.stage_events import Event, carry_out_in_worker
-from harness.campaign.execution.stage_run import Attempt, RunContext, Work
+from harness.campaign.execution.stage_run import Attempt, Event, RunContext, Work, carry_out_in_worker
 from harness.campaign.plan.stages import Stage
 
 _TERMINATING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))

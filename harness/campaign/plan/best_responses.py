@@ -10,8 +10,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 from harness.campaign.plan.alone_bounds import alone_bounds
-from harness.campaign.plan.planned_drivers import BestOf, Trained, TrainedBefore, persona_of
-from harness.campaign.plan.stages import AssessmentStage, EquilibriumGate, Stage, TrainingStage, stage_id
+from harness.campaign.plan.stages import (
+    AssessmentStage,
+    BestOf,
+    EquilibriumGate,
+    Stage,
+    Trained,
+    TrainedBefore,
+    TrainingStage,
+    persona_of,
+    stage_id,
+)
 from harness.config.campaign import Campaign
 from harness.config.training import ATTENTIVE_SHARE
 from harness.evaluation.strategies import BestResponse

@@ -22,8 +22,15 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from harness.campaign.plan.best_responses import gate_of, plan_best_responses
-from harness.campaign.plan.planned_drivers import EquilibriumMixture, FixedMixture, Side, members_of
-from harness.campaign.plan.stages import AssessmentStage, EquilibriumGate, Stage
+from harness.campaign.plan.stages import (
+    AssessmentStage,
+    EquilibriumGate,
+    EquilibriumMixture,
+    FixedMixture,
+    Side,
+    Stage,
+    members_of,
+)
 from harness.campaign.plan.strategy_stages import SeedStages, ego_learns
 from harness.evaluation.strategies import (
     PAPER_ROUNDS,

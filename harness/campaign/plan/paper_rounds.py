@@ -38,8 +38,16 @@ from harness.evaluation.strategies import (
 
 def plan_paper_rounds(of: SeedStages, personas: Sequence[str]) -> list[Stage]:
     """The stages of rounds 0 to 2, each after those it needs."""
-    learns = ego_learns(of.campaign)
-    stages: list[Stage] = [_naive_training(of)] if learns else []
+    learns, alone_share = ego_learns(of.campaign), of.campaign.naive_training.alone_share
+    stages: list[Stage] = []
+    if learns:
+        beside = of.side(SumoNonEgo()) if alone_share < 1.0 else ()
+        naive = NaiveEgo()
+        stages.append(
+            TrainingStage(
+                seed=of.seed, persona="", strategy=naive, opponent=beside, initial=None, alone_share=alone_share
+            )
+        )
     stages += [of.training(PersonaNonEgo(persona=name), of.side(NaiveEgo()), persona=name) for name in personas]
     stages += [of.assessment(NAIVE_ALONE), of.assessment(NAIVE_VS_SUMO)]
     for name in (*personas, *of.campaign.mixed_people):
@@ -70,14 +78,6 @@ def plan_searches(of: SeedStages, personas: Sequence[str]) -> list[Stage]:
         stages.append(SearchStage(seed=of.seed, persona=name, opponent=of.side(PersonaNonEgo(persona=name))))
         stages += _round_2_arms(of, ReconfiguredEgo(against=name))
     return stages
-
-
-def _naive_training(of: SeedStages) -> TrainingStage:
-    alone_share = of.campaign.naive_training.alone_share
-    opponent = of.side(SumoNonEgo()) if alone_share < 1.0 else ()
-    return TrainingStage(
-        seed=of.seed, persona="", strategy=NaiveEgo(), opponent=opponent, initial=None, alone_share=alone_share
-    )
 
 
 def _round_2_arms(of: SeedStages, ego: RetrainedEgo | ReconfiguredEgo) -> list[AssessmentStage]:

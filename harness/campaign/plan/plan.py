@@ -65,7 +65,6 @@ def _plan_preventability(campaign: Campaign, stages: Iterable[Stage]) -> list[Pr
 
 
 def _plan_crossplay(of: SeedStages, rounds: Sequence[PersonaRounds]) -> list[AssessmentStage]:
-    """The arms of every ego against every non-ego."""
     if of.campaign.crossplay is None:
         return []
     egos = {ego.strategy: ego for each in rounds for ego in each.egos}

@@ -7,7 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import PurePath
 
-from harness.campaign.plan.planned_drivers import (
+from harness.campaign.plan.stages import (
+    AssessmentStage,
+    EquilibriumGate,
     External,
     FixedMixture,
     PlannedDriver,
@@ -17,10 +19,11 @@ from harness.campaign.plan.planned_drivers import (
     SumoDriven,
     Trained,
     TrainedBefore,
+    TrainingStage,
     members_of,
     persona_of,
+    stage_id,
 )
-from harness.campaign.plan.stages import AssessmentStage, EquilibriumGate, TrainingStage, stage_id
 from harness.config.campaign import LEARNED, SUMO, Campaign
 from harness.config.training import ATTENTIVE_SHARE, Training
 from harness.evaluation.strategies import (
@@ -74,7 +77,6 @@ class SeedStages:
         return members[0] if len(members) == 1 else FixedMixture(members=members, shares=tuple(shares.values()))
 
     def assessment(self, arm: Arm, *, persona: str = "", gates: tuple[EquilibriumGate, ...] = ()) -> AssessmentStage:
-        """The assessment of an arm."""
         ego, non_ego = self.side(arm.ego), self.side(arm.non_ego)
         return AssessmentStage(seed=self.seed, persona=persona, arm=arm, ego=ego, non_ego=non_ego, gates=gates)
 

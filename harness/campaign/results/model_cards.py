@@ -13,8 +13,7 @@ import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from harness.campaign.plan.plan import plan
-from harness.campaign.plan.planned_drivers import Trained
-from harness.campaign.plan.stages import AssessmentStage
+from harness.campaign.plan.stages import AssessmentStage, Trained
 from harness.campaign.storage.manifest import is_tuned
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign

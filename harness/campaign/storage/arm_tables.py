@@ -39,8 +39,6 @@ _READ_BY = ("environments/recorded.py", "evaluation", "game", "road")
 
 @dataclass(frozen=True, kw_only=True)
 class ArmTables:
-    """The tables of an arm."""
-
     episodes: pd.DataFrame
     causes: pd.DataFrame
     manoeuvres: pd.DataFrame

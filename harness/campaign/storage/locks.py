@@ -26,7 +26,10 @@ def only_one(file: Path) -> Iterator[None]:
     try:
         _acquire(lock)
     except Timeout:
-        raise InUse(_text_of(owner) or "another process") from None
+        name = ""
+        with contextlib.suppress(OSError, UnicodeDecodeError):
+            name = owner.read_text(encoding="utf-8")[:200].strip()
+        raise InUse(name or "another process") from None
     try:
         owner.write_text(f"process {os.getpid()}", encoding="utf-8")
         yield
@@ -87,10 +90,3 @@ def _acquire(lock: FileLock, timeout_s: float = 0.0) -> None:
     """Raises Timeout if another process holds the lock. On a file system without locks it is always free."""
     with contextlib.suppress(NotImplementedError):
         lock.acquire(timeout=timeout_s)
-
-
-def _text_of(file: Path) -> str:
-    try:
-        return file.read_text(encoding="utf-8")[:200].strip()
-    except (OSError, UnicodeDecodeError):
-        return ""

@@ -35,8 +35,6 @@ class _Record(Document):
 
 
 class StageEntry(_Record):
-    """A stage in the manifest."""
-
     kind: Literal["training", "assessment", "reconfiguration", "preventability"]
     name: Text
     persona: Name | Literal[""] = ""
@@ -65,13 +63,7 @@ class StageEntry(_Record):
     """Of a training: the least share of these games for its player to have learned."""
 
 
-class _Format(_Record):
-    format: int
-
-
 class Manifest(_Record):
-    """The content of a manifest."""
-
     format: int
     name: CampaignName
     file: Text
@@ -107,23 +99,22 @@ class Manifest(_Record):
 def read_manifest(file: Path, content: bytes) -> dict[str, Any]:
     """The content of a manifest. Raises UsageError if it is damaged, or has another format than `FORMAT`."""
     try:
-        found = _Format.model_validate_json(content).format
-        if found != FORMAT:
+        manifest: dict[str, Any] = json.loads(content)
+        found = manifest.get("format") if isinstance(manifest, dict) else None
+        if isinstance(found, int) and found != FORMAT:
             message = f"the run folder has format {found}, this version of the harness reads format {FORMAT}"
             raise UsageError.of(file, "format", message, RUN_AGAIN)
         Manifest.model_validate_json(content)
-        return dict(json.loads(content))
+        return manifest
+    except ValidationError as error:
+        wrong = [f"{'.'.join(map(str, each['loc'])) or 'it'}: {each['msg']}" for each in error.errors()]
+        more = [f"and {len(wrong) - _MOST_LISTED} more"] if len(wrong) > _MOST_LISTED else []
+        words = "; ".join([*wrong[:_MOST_LISTED], *more])
     except (ValueError, RecursionError) as error:
-        words = _words(error) if isinstance(error, ValidationError) else str(error)
-        raise UsageError.of(file, "", f"is damaged: {words}", RUN_AGAIN) from None
+        words = str(error)
+    raise UsageError.of(file, "", f"is damaged: {words}", RUN_AGAIN)
 
 
 def is_tuned(manifest: Mapping[str, Any]) -> bool:
     """Whether the campaign's ego has tunable parameters, which round 2 searches."""
     return any(entry["kind"] == "reconfiguration" for entry in manifest["stages"].values())
-
-
-def _words(error: ValidationError) -> str:
-    found = [f"{'.'.join(map(str, each['loc'])) or 'it'}: {each['msg']}" for each in error.errors()]
-    more = f"; and {len(found) - _MOST_LISTED} more" if len(found) > _MOST_LISTED else ""
-    return "; ".join(found[:_MOST_LISTED]) + more

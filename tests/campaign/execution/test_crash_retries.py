@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from harness.campaign.execution.crash_retries import MOST_ABANDONED, MOST_CRASHES, Crashes
-from harness.campaign.execution.stage_events import Event
+from harness.campaign.execution.run_stages import MOST_ABANDONED, MOST_CRASHES, Crashes
+from harness.campaign.execution.stage_run import Event
 from harness.campaign.plan.stages import AssessmentStage, TrainingStage
 from harness.evaluation.strategies import Arm, NaiveEgo, PersonaNonEgo
 

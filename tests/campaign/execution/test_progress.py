@@ -9,7 +9,7 @@ import pytest
 from rich.console import Console
 
 from harness.campaign.execution.progress import STARTING, StageProgress
-from harness.campaign.execution.stage_events import Event, preparations_reported
+from harness.campaign.execution.stage_run import Event, preparations_reported
 from harness.campaign.plan.plan import plan
 from harness.config.campaign import Campaign
 from harness.evaluation.competence import DID_NOT_LEARN, Goals

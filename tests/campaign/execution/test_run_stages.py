@@ -6,9 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import pytest
 
-from harness.campaign.execution.crash_retries import MOST_CRASHES, Attempt
-from harness.campaign.execution.run_stages import run_stages
-from harness.campaign.execution.stage_events import Event
+from harness.campaign.execution.run_stages import MOST_CRASHES, Attempt, run_stages
+from harness.campaign.execution.stage_run import Event
 from harness.campaign.plan.stages import Stage
 from tests.support.plans import training_of as stage
 

@@ -11,10 +11,8 @@ from typing import Any
 
 import pytest
 
-from harness.campaign.execution.crash_retries import MOST_CRASHES
-from harness.campaign.execution.run_stages import run_stages
-from harness.campaign.execution.stage_events import Event
-from harness.campaign.execution.stage_run import StageRun
+from harness.campaign.execution.run_stages import MOST_CRASHES, run_stages
+from harness.campaign.execution.stage_run import Event, StageRun
 from harness.campaign.execution.worker_pool import WorkerPool
 from harness.campaign.plan.stages import Stage
 from harness.cli.messages import INTERRUPTED

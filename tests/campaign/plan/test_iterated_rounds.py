@@ -9,17 +9,18 @@ from typing import Any
 import pytest
 
 from harness.campaign.plan.paper_rounds import plan_paper_rounds
-from harness.campaign.plan.planned_drivers import (
+from harness.campaign.plan.stages import (
     BestOf,
+    EquilibriumGate,
     EquilibriumMixture,
     FixedMixture,
     Side,
     Trained,
     TrainedBefore,
+    TrainingStage,
     description,
     members_of,
 )
-from harness.campaign.plan.stages import EquilibriumGate, TrainingStage
 from harness.campaign.plan.strategy_stages import SeedStages, crossplay_name, training_settings
 from harness.campaign.preflight import open_campaign
 from harness.campaign.results.matchups import Matchups, matchups_of

@@ -10,8 +10,7 @@ import pytest
 
 from harness.campaign.plan.paper_rounds import questions
 from harness.campaign.plan.plan import plan
-from harness.campaign.plan.planned_drivers import SumoDriven, Trained, description
-from harness.campaign.plan.stages import AssessmentStage, TrainingStage
+from harness.campaign.plan.stages import AssessmentStage, SumoDriven, Trained, TrainingStage, description
 from harness.drivers.policy_file import write_policy
 from harness.game.roles import EGO, NON_EGO
 from tests.support.plans import campaign_of, planned, stages_of

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from harness.campaign.execution.run_campaign import log_event
-from harness.campaign.execution.stage_events import Event
+from harness.campaign.execution.stage_run import Event
 from harness.campaign.storage.run_log import LOG, LOGGER, run_log
 from harness.errors import UsageError
 
