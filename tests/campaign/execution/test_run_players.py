@@ -29,18 +29,13 @@ def hashes(policies: Path) -> dict[str, str]:
     return {"mine.toml": "0" * 64, **found}
 
 
-def test_policies__beside_the_folder_of_the_run_are_found(
+def test_policies__beside_the_folder_of_the_run_are_found_unless_they_have_changed(
     tmp_path: Path, policies: Path, hashes: dict[str, str]
 ) -> None:
     (tmp_path / "reports" / "mine").mkdir(parents=True)
     found = policies_of_run(tmp_path / "reports" / "mine", WRITTEN, hashes)
     assert found is not None
     assert found.resolve() == policies
-
-
-def test_policies__that_have_changed_since_are_not_taken(
-    tmp_path: Path, policies: Path, hashes: dict[str, str]
-) -> None:
     (policies / "naive-seed1" / "policy.safetensors").write_bytes(b"others")
     assert policies_of_run(tmp_path / "reports" / "mine", WRITTEN, hashes) is None
 

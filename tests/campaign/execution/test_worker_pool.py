@@ -95,17 +95,15 @@ def die_when_idle(stage: Stage, run: StageRun) -> dict[str, Any]:
 
 
 def test_run_stages__each_after_what_it_needs(tmp_path: Path) -> None:
-    stages = [stage("a"), stage("b", "a"), stage("c", "a"), stage("d", "b", "c"), stage("e")]
-    events = run(tmp_path, stages, note)
+    events = run(tmp_path, [stage("a"), stage("b", "a"), stage("c", "a"), stage("d", "b", "c"), stage("e")], note)
     order = [line.removesuffix("-seed1") for line in (tmp_path / "done").read_text().split()]
-    assert sorted(order) == ["a", "b", "c", "d", "e"]
     assert order.index("a") < min(order.index("b"), order.index("c"))
     assert order.index("d") > max(order.index("b"), order.index("c"))
-    assert sorted(told(events, "started")) == sorted(told(events, "done")) == ["a", "b", "c", "d", "e"]
-    pids = {event.info["pid"] for event in events if event.kind == "done"}
-    assert os.getpid() not in pids
-    assert len(pids) <= 2
-    assert all(event.info["deaf"] for event in events if event.kind == "done")
+    assert sorted(order) == sorted(told(events, "started")) == sorted(told(events, "done")) == ["a", "b", "c", "d", "e"]
+    done = [event.info for event in events if event.kind == "done"]
+    assert os.getpid() not in {each["pid"] for each in done}
+    assert len({each["pid"] for each in done}) <= 2
+    assert all(each["deaf"] for each in done)
     assert not workers_of(os.getpid())
 
 
@@ -116,15 +114,13 @@ def test_run_stages__progress_is_told_but_not_all_of_it(tmp_path: Path) -> None:
 
 
 def test_run_stages__a_stage_that_fails_is_named_and_the_rest_goes_on(tmp_path: Path) -> None:
-    stages = [stage("a"), stage("b"), stage("c", "b"), stage("d", "c"), stage("e", "a"), stage("bug")]
-    events = run(tmp_path, stages, raise_in_b)
+    events = run(tmp_path, [stage("a"), stage("b"), stage("c", "b"), stage("e", "a"), stage("bug")], raise_in_b)
     assert sorted(told(events, "done")) == ["a", "e"]
-    failed = {event.stage: event.message for event in events if event.kind == "failed"}
-    assert failed["b-seed1"] == "b-seed1: a payoff is not finite"
-    assert "Traceback" in failed["bug-seed1"]  # a bug is told with its traceback
-    assert "KeyError: 'a bug'" in failed["bug-seed1"]
-    skipped = {event.stage: event.message for event in events if event.kind == "skipped"}
-    assert skipped == {"c-seed1": "needs b-seed1, which failed", "d-seed1": "needs c-seed1, which failed"}
+    messages = {event.stage: event.message for event in events if event.kind in ("failed", "skipped")}
+    assert messages["b-seed1"] == "b-seed1: a payoff is not finite"
+    assert messages["c-seed1"] == "needs b-seed1, which failed"
+    assert "Traceback" in messages["bug-seed1"]
+    assert "KeyError: 'a bug'" in messages["bug-seed1"]
 
 
 def test_run_stages__a_stage_that_always_kills_its_worker_fails_by_name(tmp_path: Path) -> None:

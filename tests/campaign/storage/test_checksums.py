@@ -28,14 +28,11 @@ def mismatches_in(folder: Path) -> list[str]:
     return [file.relative_to(folder).as_posix() for file in mismatches(record, folder)]
 
 
-def test_checksums__match_and_keep_their_facts(finished: Path) -> None:
+def test_checksums__match_and_keep_their_facts_also_after_the_folder_has_moved(finished: Path) -> None:
     record = read_checksums(finished / "checksums.json")
     assert record is not None
     assert record["of"] == "x"
     assert mismatches_in(finished) == []
-
-
-def test_checksums__match_after_the_folder_has_moved(finished: Path) -> None:
     assert mismatches_in(finished.rename(finished.with_name("moved"))) == []
 
 
