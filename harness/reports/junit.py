@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
-from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
+from junitparser import Error, Failure, JUnitXml, TestCase, TestSuite
 
 from harness.errors import plain
 from harness.files import write_atomically
@@ -15,7 +15,7 @@ from harness.files import write_atomically
 
 @dataclass(frozen=True, kw_only=True)
 class JUnitCase:
-    """One check and its outcome. At most one of `failure`, `error` and `skipped` is given; without any it passed."""
+    """One check and its outcome. At most one of `failure` and `error` is given; without any it passed."""
 
     name: str
     group: str
@@ -24,8 +24,6 @@ class JUnitCase:
     """Why it failed, in one sentence."""
     error: str = ""
     """Why it could not be carried out."""
-    skipped: str = ""
-    """Why it was left out."""
     details: str = ""
     """Further lines, such as the figures that were compared."""
     seconds: float = 0.0
@@ -47,7 +45,7 @@ def write_junit(
 
 def _case(check: JUnitCase) -> TestCase:
     case = TestCase(plain(check.name), plain(check.group), check.seconds)
-    kinds = ((Failure, check.failure), (Error, check.error), (Skipped, check.skipped))
+    kinds = ((Failure, check.failure), (Error, check.error))
     case.result = [kind(plain(message)) for kind, message in kinds if message]
     if check.details:
         case.system_out = "\n".join(plain(line) for line in check.details.splitlines())

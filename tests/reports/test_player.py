@@ -105,16 +105,9 @@ def test_player__speed_is_the_speed_of_the_clock(player, speed):
 
 def test_player__keys_step_one_frame_jump_a_second_and_go_to_the_ends(player, games):
     page = player()
-    for pressed, expected in (
-        ("Period", 2.1),
-        ("Period", 2.2),
-        ("Comma", 2.1),
-        ("ArrowRight", 3.1),
-        ("ArrowLeft", 2.1),
-        ("End", games[GAME].steps * STEP_S),
-        ("Home", 0),
-        ("c", games[GAME].touches[0][0]),
-    ):
+    game = games[GAME]
+    steps = [("Period", 2.1), ("Period", 2.2), ("Comma", 2.1), ("ArrowRight", 3.1), ("ArrowLeft", 2.1)]
+    for pressed, expected in (*steps, ("End", game.steps * STEP_S), ("Home", 0), ("c", game.touches[0][0])):
         press(page, pressed)
         assert time_of(page) == pytest.approx(expected, abs=1e-6), pressed
 
@@ -122,34 +115,28 @@ def test_player__keys_step_one_frame_jump_a_second_and_go_to_the_ends(player, ga
 # --- the road ---
 
 
+PIXEL = """(canvas, [x, y]) => {
+  const [left, top, scale] = canvas.dataset.camera.split(' ').map(Number);
+  const ratio = canvas.width / canvas.getBoundingClientRect().width;
+  const place = [(left + x * scale) * ratio, (top - y * scale) * ratio].map(Math.round);
+  return [...canvas.getContext('2d').getImageData(...place, 1, 1).data].slice(0, 3);
+}"""
+COLOUR = """name => {
+  const context = document.createElement('canvas').getContext('2d');
+  context.fillStyle = getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  context.fillRect(0, 0, 1, 1);
+  return [...context.getImageData(0, 0, 1, 1).data].slice(0, 3);
+}"""
+
+
 def pixel(page, screen, x_m, y_m):
     """Colour of the canvas at a place on the road."""
-    return (
-        page.locator(".view")
-        .nth(screen)
-        .evaluate(
-            """(canvas, [x, y]) => {
-          const [left, top, scale] = canvas.dataset.camera.split(' ').map(Number);
-          const ratio = canvas.width / canvas.getBoundingClientRect().width;
-          const place = [(left + x * scale) * ratio, (top - y * scale) * ratio].map(Math.round);
-          return [...canvas.getContext('2d').getImageData(...place, 1, 1).data].slice(0, 3);
-        }""",
-            [x_m, y_m],
-        )
-    )
+    return page.locator(".view").nth(screen).evaluate(PIXEL, [x_m, y_m])
 
 
 def colour(page, name):
     """A colour of the page, as its canvas has it."""
-    return page.evaluate(
-        """name => {
-          const context = document.createElement('canvas').getContext('2d');
-          context.fillStyle = getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-          context.fillRect(0, 0, 1, 1);
-          return [...context.getImageData(0, 0, 1, 1).data].slice(0, 3);
-        }""",
-        name,
-    )
+    return page.evaluate(COLOUR, name)
 
 
 @pytest.mark.parametrize("settings", [{}, {"color_scheme": "dark"}, {"width": 400, "device_scale_factor": 2}])
@@ -159,12 +146,9 @@ def test_road__cars_are_where_the_trace_has_them(player, games, settings):
     for step in (3, 27, 48, 60):
         scrub(page, step * STEP_S)
         for player in games[GAME].players:
-            assert pixel(page, 0, player.x_m[step], player.y_m[step]) == colour(page, names[player.name]), (
-                step,
-                player.name,
-            )
-        asphalt = pixel(page, 0, games[GAME].players[0].x_m[step] + 5, -1.6)
-        assert asphalt == colour(page, "--asphalt")
+            found = pixel(page, 0, player.x_m[step], player.y_m[step])
+            assert found == colour(page, names[player.name]), (step, player.name)
+        assert pixel(page, 0, games[GAME].players[0].x_m[step] + 5, -1.6) == colour(page, "--asphalt")
 
 
 def test_road__between_two_steps_a_car_is_between_its_places(player, games):

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import pandas as pd
 
-from harness.config.campaign import Campaign, Population
+from harness.config.campaign import Campaign
 from harness.evaluation.columns import TABLES
 from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.people import people_in
-from harness.evaluation.strategies import Arm, NaiveEgo, PersonaNonEgo, ReconfiguredEgo, RetrainedEgo
+from harness.evaluation.strategies import NaiveEgo, ReconfiguredEgo, RetrainedEgo, against_persona
 from harness.evaluation.tables import joined
 from harness.game.initial_state import member_in_episode
 from harness.game.roles import NON_EGO
@@ -24,27 +22,17 @@ def by_who_drove(campaign: Campaign, episodes: pd.DataFrame) -> pd.DataFrame:
 
     The draw is repeated here: it depends on the place, the arm's seed and the episode only.
     """
-    frames = [
-        _rows(population, games) for population in campaign.population for games in _arms_of(population, episodes)
-    ]
+    frames = []
+    for population in campaign.population:
+        name, names, shares = population.name, list(population.shares), list(population.shares.values())
+        egos = (NaiveEgo(), RetrainedEgo(against=name), ReconfiguredEgo(against=name))
+        for arm in [against_persona(ego, name).name for ego in egos]:
+            games = episodes[episodes["arm"] == arm]
+            players = range(NON_EGO, NON_EGO + len(people_in(games.columns)))
+            drivers = [
+                ", ".join(names[member_in_episode(shares, player, int(seed), int(episode))] for player in players)
+                for seed, episode in zip(games["seed"], games["episode"], strict=True)
+            ]
+            rows = summarise(games.assign(persona=drivers)).sort_values(["seed", "persona"], kind="stable")
+            frames.append(rows[["arm", "seed", "persona", *_SUMMARY_COLUMNS]].assign(population=name))
     return joined("populations", frames)
-
-
-def _arms_of(population: Population, episodes: pd.DataFrame) -> Iterable[pd.DataFrame]:
-    """The games of each arm against a population."""
-    name = population.name
-    for ego in (NaiveEgo(), RetrainedEgo(against=name), ReconfiguredEgo(against=name)):
-        games = episodes[episodes["arm"] == Arm(ego=ego, non_ego=PersonaNonEgo(persona=name)).name]
-        if len(games):
-            yield games
-
-
-def _rows(population: Population, games: pd.DataFrame) -> pd.DataFrame:
-    names, shares = list(population.shares), list(population.shares.values())
-    players = range(NON_EGO, NON_EGO + len(people_in(games.columns)))
-    drivers = [
-        ", ".join(names[member_in_episode(shares, player, int(seed), int(episode))] for player in players)
-        for seed, episode in zip(games["seed"], games["episode"], strict=True)
-    ]
-    rows = summarise(games.assign(persona=drivers)).sort_values(["seed", "persona"], kind="stable")
-    return rows[["arm", "seed", "persona", *_SUMMARY_COLUMNS]].assign(population=population.name)

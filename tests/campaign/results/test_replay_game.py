@@ -15,8 +15,7 @@ from harness.campaign.results.replay_game import GameList, film, game_table, pla
 from harness.campaign.results.results import write_results
 from harness.campaign.storage.run_folder import RunFolder
 from harness.errors import UsageError
-from harness.evaluation.columns import TABLES
-from harness.evaluation.tables import read_csv, table_of, write_csv
+from harness.evaluation.tables import table_of, write_csv
 from harness.replay import replay_name
 from tests.support.pictures import require_gui
 
@@ -32,14 +31,6 @@ def printed(run: Path, arm: str | None = None, width: int = 160) -> str:
     console.print(game_table(run, GameList(arm=arm)))
     assert isinstance(console.file, io.StringIO)
     return console.file.getvalue()
-
-
-def test_run__names_the_manoeuvres_of_every_arm(run: Path) -> None:
-    table = read_csv(run / "manoeuvres.csv")
-    assert list(table.columns) == list(TABLES["manoeuvres"])
-    kept = [read_csv(file) for file in sorted((run / ".stages").glob("*/manoeuvres.csv"))]
-    assert len(kept) == len(list((run / ".stages").glob("*/episodes.csv")))
-    assert len(table) == sum(map(len, kept))
 
 
 def test_list__has_the_cause_of_each_failure(run: Path) -> None:
