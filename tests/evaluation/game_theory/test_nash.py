@@ -21,7 +21,6 @@ from harness.evaluation.game_theory.nash import (
 PENNIES = np.array([[1, -1], [-1, 1]])
 DILEMMA = np.array([[3, 0], [5, 1]])  # cooperate, defect
 SEXES = np.array([[3, 0], [0, 2]]), np.array([[2, 0], [0, 3]])
-ROCK_PAPER_SCISSORS = np.array([[0, -1, 1], [1, 0, -1], [-1, 1, 0]])
 
 
 def found(ego, non_ego):
@@ -51,11 +50,6 @@ def test_battle_of_the_sexes__has_two_pure_equilibria_and_a_mixed_one():
     assert first == ([1, 0], [1, 0])  # the ego's payoff is 3, 2 and 6/5: the chosen one comes first
     assert second == ([0, 1], [0, 1])
     assert mixed == (near([0.6, 0.4]), near([0.4, 0.6]))
-
-
-def test_rock_paper_scissors__has_equal_shares():
-    ((x, y),) = found(ROCK_PAPER_SCISSORS, -ROCK_PAPER_SCISSORS)
-    assert (x, y) == (near([1 / 3] * 3), near([1 / 3] * 3))
 
 
 def test_rock_paper_scissors__a_larger_stake_shifts_the_shares():
