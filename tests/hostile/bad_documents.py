@@ -164,8 +164,8 @@ PERSONAS = [
             (f"a body of {line}", "[perception]", f"{table}\n{line}\n[perception]", said)
             for table, line, said in (
                 ("[reaction]", "delay_s = [0.5, 0.2]", ("reaction.delay_s", "empty")),
-                ("[reaction]", "delay_s = [-0.5, 0.2]", ("reaction.delay_s", "between 0 and 5 s")),
-                ("[reaction]", "delay_s = [0.5, 6.0]", ("reaction.delay_s", "between 0 and 5 s")),
+                ("[reaction]", "delay_s = [-0.5, 0.2]", ("reaction.delay_s[0]", "-0.5 is not possible")),
+                ("[reaction]", "delay_s = [0.5, 6.0]", ("reaction.delay_s[1]", "6.0 is not possible")),
                 ("[reaction]", "delay_s = [nan, nan]", ("reaction.delay_s",)),
                 ("[reaction]", "delay_s = 0.5", ("reaction.delay_s",)),
                 ("[reaction]", "", ("reaction.delay_s: is missing",)),
