@@ -13,13 +13,6 @@ import tempfile
 from pathlib import Path
 
 _SCRATCH = ".part"
-_KINDS = {
-    stat.S_IFDIR: "is a folder, not a file",
-    stat.S_IFIFO: "is a pipe, not a file",
-    stat.S_IFSOCK: "is a socket, not a file",
-    stat.S_IFCHR: "is a device, not a file",
-    stat.S_IFBLK: "is a device, not a file",
-}
 
 
 def write_atomically(path: Path, content: bytes) -> None:
@@ -80,9 +73,8 @@ def sync_folder(folder: Path) -> None:
 def check_file(path: Path, most_bytes: int) -> None:
     """Raise OSError, with the reason in its `strerror`, unless this is a plain file of at most `most_bytes` bytes."""
     status = os.stat(path)
-    kind = stat.S_IFMT(status.st_mode)
-    if kind != stat.S_IFREG:
-        raise OSError(errno.EINVAL, _KINDS.get(kind, "is not a plain file"), str(path))
+    if not stat.S_ISREG(status.st_mode):
+        raise OSError(errno.EINVAL, "is a folder or a device, not a plain file", str(path))
     if status.st_size > most_bytes:
         raise OSError(errno.EFBIG, _too_large(status.st_size, most_bytes), str(path))
 

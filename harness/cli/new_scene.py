@@ -114,7 +114,6 @@ def _numbered(opened: OpenMap, number: int | None, plans: Sequence[GamePlan]) ->
 
 
 def _show(opened: OpenMap, plans: Sequence[GamePlan], console: Console) -> None:
-    """The table and the numbers of a map's conflicts."""
     from harness.cli.net_tables import plan_table
 
     console.print(plan_table([(plan, opened.place_of(plan)) for plan in plans]), highlight=False)

@@ -142,7 +142,6 @@ def _schema_at(document: Any, path: str) -> Any:
 
 
 def _resolved(document: Any, node: Any) -> Any:
-    """A schema, or the schema that it refers to."""
     return document["$defs"][node["$ref"].rpartition("/")[2]] if "$ref" in node else node
 
 

@@ -117,7 +117,6 @@ def regression(
 
 
 def _found(found: Pinned) -> Iterator[str]:
-    """What was found, and where it was written."""
     game = found.game
     alike = f", stands for {game.alike} alike" if game.alike > 1 else ""
     yield f"{plain(game.arm)}, seed {game.seed}, game {game.episode}: {game.outcome}{alike}"
@@ -130,14 +129,12 @@ def _found(found: Pinned) -> Iterator[str]:
 
 
 def _played_again(played: PlayedAgain) -> str:
-    """One game and its outcome."""
     word = "PASS" if played.passed else "ERROR" if played.error else "FAIL"
     why = f": {plain(played.error)}" if played.error else "" if played.passed else f": {played.outcome}"
     return f"{word}  {plain(played.name)}{why}  ({played.seconds:.1f} s)"
 
 
 def _case_of(played: PlayedAgain) -> JUnitCase:
-    """The game as a case of a JUnit file."""
     from harness.reports.junit import JUnitCase
 
     game = played.game

@@ -95,7 +95,7 @@ def export(
     from rich.console import Console
 
     from harness.campaign.results.export_games import export_failures, export_game
-    from harness.export import Formats
+    from harness.export.folder import Formats
 
     if not (openscenario or opendrive or csv):
         openscenario = opendrive = True

@@ -134,7 +134,6 @@ def _scene_files(name: str, plan: GamePlan, opened: OpenMap, *, is_part: bool) -
 
 
 def _campaign_text(name: str, plan: GamePlan) -> str:
-    """A campaign on a scene with the shipped personas that suit its kind."""
     kind = plan.candidate.kind
     signals = kind is CandidateKind.CROSSING and plan.candidate.with_signals
     return rendered(

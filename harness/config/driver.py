@@ -8,11 +8,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias, get_args
 
-from pydantic import ConfigDict, Field, field_validator
+from pydantic import ConfigDict, Field
 
 from harness.config.campaign import DocumentPath
 from harness.config.rule_driver import Rules
-from harness.config.toml_reading import Document, nearest, read_document
+from harness.config.toml_reading import Document, nearest, one_of, read_document
 from harness.config.tunable import Adjustable, ParameterName
 from harness.errors import UsageError
 from harness.game.observation_layout import LAYOUT
@@ -23,6 +23,8 @@ OUTPUTS = ("acceleration_mps2", "steering_rad")
 Argument = Annotated[str, Field(max_length=2000, pattern=r"^[^\x00]*$")]
 KIND = Field(description="The kind of driver, which determines the other keys.")
 VariableName = Annotated[str, Field(min_length=1, max_length=200)]
+Entry = Annotated[str, one_of(LAYOUT, "the observation has no entry")]
+Control = Annotated[str, one_of(OUTPUTS, "there is no control")]
 PedalsAndWheel = Annotated[list[Annotated[float, Field(ge=-1.0, le=1.0)]], Field(min_length=2, max_length=2)]
 DeadlineS = Annotated[float, Field(gt=0.0, le=600.0)]
 
@@ -83,10 +85,12 @@ class Fmu(Adjustable, WithFiles):
     kind: Literal["fmu"] = KIND
     file: DocumentPath
     """The FMU, relative to this document's folder."""
-    inputs: dict[VariableName, str] = Field({}, max_length=200)
+    inputs: dict[VariableName, Annotated[str, one_of(LAYOUT, "the observation has no entry")]] = Field(
+        {}, max_length=200
+    )
     """The entry of the observation that each input of the FMU receives. An input that is not listed receives the entry
     of its name; without such an entry it keeps its start value."""
-    outputs: dict[str, VariableName] = Field({}, max_length=2)
+    outputs: dict[Control, VariableName] = Field({}, max_length=2)
     """The names of the FMU's outputs for `acceleration_mps2` and `steering_rad`, if they differ from these."""
     start: dict[VariableName, bool | int | float | str] = Field({}, max_length=1000)
     """Start values of parameters, and of inputs that receive no entry: numbers, texts, true or false; of an enumeration
@@ -95,22 +99,6 @@ class Fmu(Adjustable, WithFiles):
     """Longest time of a decision. It only detects programs that hang: a busy machine must not change a game."""
     start_deadline_s: DeadlineS = 60.0
     """Longest time of loading and initialisation."""
-
-    @field_validator("inputs")
-    @classmethod
-    def _entries_exist(cls, inputs: dict[str, str]) -> dict[str, str]:
-        for entry in inputs.values():
-            if entry not in LAYOUT:
-                raise ValueError(f"the observation has no entry {entry!r}: {nearest(entry, LAYOUT)}")
-        return inputs
-
-    @field_validator("outputs")
-    @classmethod
-    def _controls_exist(cls, outputs: dict[str, str]) -> dict[str, str]:
-        for name in outputs:
-            if name not in OUTPUTS:
-                raise ValueError(f"there is no control {name!r}: {nearest(name, OUTPUTS)}")
-        return outputs
 
 
 class StableBaselines3(WithFiles):

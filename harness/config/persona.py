@@ -10,7 +10,7 @@ from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
 from harness.config.human_limits import AttentionLapses, CarUse, Perception, ReactionTime
 from harness.config.scene import Name
-from harness.config.toml_reading import NUMBER, TABLE, Document, Mistakes, nearest
+from harness.config.toml_reading import NUMBER, TABLE, Document, Mistakes, nearest, one_of
 from harness.game.human_factors import ActuatorShares, Attention, HumanFactors, Reaction, Sight
 from harness.game.payoff import FuzzyFunction, FuzzySet, Payoff, Weighted
 from harness.game.payoff_terms import FUZZY_QUANTITIES, GROUPS, NEARNESS, TERMS
@@ -89,17 +89,10 @@ class FuzzyTerm(Document):
     """The name of the term, also in tables."""
     weight: Weight = 1.0
     """Factor of the function's value."""
-    quantity: str
+    quantity: Annotated[str, one_of(FUZZY_QUANTITIES, "unknown quantity")]
     """The quantity of the game that the term is a function of."""
     sets: list[MembershipFunction] = Field(min_length=1, max_length=20)
     """The fuzzy sets. The value of the term is the mean of their values, weighted by membership; 0 outside all sets."""
-
-    @field_validator("quantity")
-    @classmethod
-    def _quantity_exists(cls, quantity: str) -> str:
-        if quantity not in FUZZY_QUANTITIES:
-            raise ValueError(f"unknown quantity {quantity!r}: {nearest(quantity, FUZZY_QUANTITIES)}")
-        return quantity
 
     @field_validator("name")
     @classmethod

@@ -105,10 +105,6 @@ def read_document(path: str | Path, model: type[D]) -> D:
         table = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # ValueError: besides bad TOML, a number of thousands of digits
         raise UsageError.of(path, "", f"is not valid TOML: {error}", "correct the file at this line") from None
-    return _validated(path, table, model)
-
-
-def _validated(path: Path, table: dict[str, Any], model: type[D]) -> D:
     try:
         return model.model_validate_json(json.dumps(table, default=str))
     except ValidationError as error:
@@ -128,6 +124,17 @@ def nearest(word: str, words: Iterable[str]) -> str:
         return f"did you mean {close[0]!r}?"
     more = f" and {len(words) - _NAMES_SHOWN} more" if len(words) > _NAMES_SHOWN else ""
     return f"valid: {', '.join(words[:_NAMES_SHOWN])}{more}"
+
+
+def one_of(words: Iterable[str], otherwise: str) -> AfterValidator:
+    """A check that a text is one of these words; its message begins as given, and names the nearest word."""
+
+    def check(word: str) -> str:
+        if word not in words:
+            raise ValueError(f"{otherwise} {word!r}: {nearest(word, words)}")
+        return word
+
+    return AfterValidator(check)
 
 
 def _problems(path: Path, model: type[BaseModel], error: Any) -> Iterator[Problem]:

@@ -83,7 +83,6 @@ class Adjustable(Document):
         return type(self).model_validate(document | {"tunable": tunable})
 
     def _set(self, document: dict[str, Any], key: str, value: float) -> None:
-        """Set a parameter in a dump of the document."""
         document[self.parameter_table][key] = value
 
     def _mistake(self, tunable: Tunable) -> tuple[str, str, str] | None:

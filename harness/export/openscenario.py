@@ -197,6 +197,5 @@ def _event(name: str, time_s: float) -> xosc.Event:
 
 
 def _at(time_s: float, name: str, *, starts: bool = True) -> xosc.ValueTrigger:
-    """A trigger from a time of the simulation on."""
     when = xosc.SimulationTimeCondition(round(time_s, 6), xosc.Rule.greaterOrEqual)
     return xosc.ValueTrigger(name, 0, xosc.ConditionEdge.none, when, "start" if starts else "stop")

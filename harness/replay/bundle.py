@@ -116,5 +116,4 @@ def _configuration(title: str, end_s: float, step_length_s: float) -> ElementTre
 
 
 def _has_signals(trace: pd.DataFrame) -> bool:
-    """Whether the game was recorded with traffic lights."""
     return "signals" in trace and bool((trace["signals"] != "").any())

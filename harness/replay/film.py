@@ -21,7 +21,7 @@ from PIL import Image
 
 from harness.errors import HarnessError, Problem, UsageError
 from harness.game.arrays import FloatArray
-from harness.replay.pictures import FORMATS, captioned, encode, encoding_problem, labels_at
+from harness.replay.pictures import FORMATS, captioned, encode, find_ffmpeg, labels_at
 from harness.replay.sumo_gui import NO_SUMO_GUI, find_sumo_gui, find_xvfb, home_of, screen_problem, virtual_screen
 from harness.replay.vehicles import PLAYER_COLOURS, legend
 from harness.road.xml.xml_file import parse_xml
@@ -41,8 +41,9 @@ def film_problems(file: Path) -> list[Problem]:
     problems = []
     if file.suffix.lower() not in FORMATS:
         problems.append(Problem(str(file), "", "is neither .gif nor .mp4", "name it film.gif or film.mp4"))
-    elif missing := encoding_problem(file):
-        problems.append(missing)
+    elif file.suffix.lower() == ".mp4" and find_ffmpeg() is None:
+        remedy = "apt-get install ffmpeg, or pip install imageio-ffmpeg; a .gif needs neither"
+        problems.append(Problem("ffmpeg", "", "is not installed, and an .mp4 needs it", remedy))
     if not file.parent.is_dir():
         problems.append(Problem(str(file.parent), "", "is not a folder", "create it first"))
     if find_sumo_gui() is None:

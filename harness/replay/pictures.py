@@ -18,7 +18,7 @@ from pathlib import Path
 import pandas as pd
 from PIL import Image, ImageDraw, ImageFont
 
-from harness.errors import HarnessError, Problem
+from harness.errors import HarnessError
 from harness.game.arrays import FloatArray
 from harness.replay.vehicles import PLAYER_COLOURS, shown_name
 
@@ -81,14 +81,6 @@ FORMATS = (".gif", ".mp4")
 _COLOURS = 64  # of a GIF: the road, the cars and their edges have far fewer
 
 
-def encoding_problem(file: Path) -> Problem | None:
-    """The missing program for a film of this name; None if nothing is missing."""
-    if file.suffix.lower() == ".mp4" and find_ffmpeg() is None:
-        remedy = "apt-get install ffmpeg, or pip install imageio-ffmpeg; a .gif needs neither"
-        return Problem("ffmpeg", "", "is not installed, and an .mp4 needs it", remedy)
-    return None
-
-
 def find_ffmpeg() -> str | None:
     """ffmpeg on PATH, else that of imageio-ffmpeg, if it is installed."""
     found = shutil.which("ffmpeg")
@@ -107,7 +99,7 @@ def encode(pictures: Iterator[Image.Image], file: Path, size_px: tuple[int, int]
         next(few).save(file, save_all=True, append_images=few, duration=round(1000 * interval_s), loop=0)
         return
     program = find_ffmpeg()
-    assert program is not None, "encoding_problem has checked for it"
+    assert program is not None, "film_problems has checked for it"
     raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size_px[0]}x{size_px[1]}", "-r", f"{1.0 / interval_s:g}"]
     # browsers and presentation programs need yuv420p and the index at the front
     coded = ["-pix_fmt", "yuv420p", "-movflags", "+faststart", str(file)]

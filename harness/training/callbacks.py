@@ -1,4 +1,4 @@
-"""Callbacks of a training: they bound the actions' standard deviation, and record the learning curve."""
+"""The callback of a training: it bounds the actions' standard deviation, and records the learning curve."""
 
 from __future__ import annotations
 
@@ -16,34 +16,12 @@ from harness.training.checkpoint import CurvePoint, Progress
 CURVE_WINDOW_STEPS = 16_384
 
 
-class DeviationBound(BaseCallback):
-    """Bounds the standard deviation of actions. Actions are clipped at ±1: beyond the bound the entropy term of PPO
-    still rewards a larger deviation, which is no exploration any more, but full throttle and full brake in turn.
-
-    `largest` is the bound after so many steps of the training.
-    """
-
-    def __init__(self, largest: Callable[[int], float]) -> None:
-        super().__init__()
-        self._largest = largest
-
-    def _on_step(self) -> bool:
-        return True
-
-    def _on_rollout_start(self) -> None:
-        self._bound()
-
-    def _on_training_end(self) -> None:
-        self._bound()  # the stored policy is within the bound as well
-
-    def _bound(self) -> None:
-        deviation: Any = self.model.policy.log_std
-        with torch.no_grad():
-            deviation.clamp_(max=float(np.log(self._largest(self.num_timesteps))))
-
-
 class CurveRecorder(BaseCallback):
-    """Records the learning curve of a segment and reports progress."""
+    """Records the learning curve of a segment, reports progress, and bounds the standard deviation of actions.
+
+    Actions are clipped at ±1: beyond the bound the entropy term of PPO still rewards a larger deviation, which is no
+    exploration any more, but full throttle and full brake in turn.
+    """
 
     def __init__(
         self,
@@ -52,11 +30,13 @@ class CurveRecorder(BaseCallback):
         *,
         steps: int,
         step_s: float,
+        largest_deviation: Callable[[int], float],
         on_progress: Callable[[int, int], None],
     ) -> None:
-        """`progress` is that of the segments before; `steps` is the training's budget, of steps of `step_s` seconds."""
+        """`progress` is that of the segments before; `steps` is the training's budget, of steps of `step_s` seconds;
+        `largest_deviation` is the bound after so many of them."""
         super().__init__()
-        self._environment, self._on_progress = environment, on_progress
+        self._environment, self._on_progress, self._largest_deviation = environment, on_progress, largest_deviation
         self._steps, self._step_s = steps, step_s
         self._window: list[Finished] = []
         self._window_start = progress.steps
@@ -64,6 +44,9 @@ class CurveRecorder(BaseCallback):
 
     def _on_step(self) -> bool:
         return True
+
+    def _on_rollout_start(self) -> None:
+        self._bound_deviation()
 
     def _on_rollout_end(self) -> None:
         finished = self._environment.take_finished()
@@ -74,8 +57,14 @@ class CurveRecorder(BaseCallback):
         self._on_progress(self.num_timesteps, self._steps)
 
     def _on_training_end(self) -> None:
+        self._bound_deviation()  # the stored policy is within the bound as well
         self._close_window()  # a window contains games of one segment only, so a short segment has a short window
         self.logger.dump(self.num_timesteps)
+
+    def _bound_deviation(self) -> None:
+        deviation: Any = self.model.policy.log_std
+        with torch.no_grad():
+            deviation.clamp_(max=float(np.log(self._largest_deviation(self.num_timesteps))))
 
     def _close_window(self) -> None:
         games = self._window

@@ -160,8 +160,6 @@ class CompiledPPO(PPO):
 
 
 class _ActorCritic:
-    """The policy of a rollout."""
-
     def __init__(self, policy: ActorCriticPolicy, games: int) -> None:
         self._networks = networks_of(policy)
         self._activations = workspace_of(self._networks, games).activations

@@ -23,7 +23,7 @@ from harness.environments.vector_env import JoinedVecEnv
 from harness.game.observation_layout import OF_OTHERS
 from harness.game.outcome import Outcome
 from harness.game.seeding import seed_of
-from harness.training.callbacks import CurveRecorder, DeviationBound
+from harness.training.callbacks import CurveRecorder
 from harness.training.checkpoint import Progress, read_checkpoint, write_checkpoint
 from harness.training.compiled_ppo import CompiledPPO
 from harness.training.early_stopping import Narrowing, has_converged, still_fails
@@ -90,7 +90,6 @@ def _stop_reason(spec: TrainingSpec, progress: Progress) -> str | None:
 
 
 def _converged_at(spec: TrainingSpec, progress: Progress) -> int | None:
-    """The steps of a training that has just converged."""
     settings = spec.settings
     if not settings.early_convergence or progress.steps >= Narrowing.of(settings, None).start:
         return None
@@ -134,7 +133,6 @@ def _initial_deviation(spec: TrainingSpec) -> float:
 
 
 def _imitate(spec: TrainingSpec, model: PPO, environment: JoinedVecEnv) -> None:
-    """Let a new policy imitate the demonstrator."""
     steps = min(spec.settings.demonstration_steps, spec.settings.steps // 5)
     seed = seed_of(*spec.parts, "demonstration") % 2**31
     try:
@@ -175,13 +173,13 @@ def _segment(
         progress,
         steps=spec.settings.steps,
         step_s=spec.scene.world.step_s,
+        largest_deviation=narrowing.largest_deviation,
         on_progress=on_progress,
     )
     model.num_timesteps = progress.steps
     model._last_obs = None  # SB3 then resets the games
     try:
-        bound = DeviationBound(narrowing.largest_deviation)
-        model.learn(steps, callback=[curve, bound], reset_num_timesteps=False)
+        model.learn(steps, callback=curve, reset_num_timesteps=False)
     except FloatingPointError as error:
         raise FloatingPointError(f"{error}, after {model.num_timesteps} steps") from error
     for name, value in model.policy.state_dict().items():

@@ -86,7 +86,6 @@ def sample(spec: TrainingSpec, environment: JoinedVecEnv, steps: int, *parts: st
 
 
 def _start_distribution(spec: TrainingSpec, place: LearningPlace, steps: int) -> StartDistribution:
-    """The start distribution of the games in a place, `steps` after the start of the training."""
     alone = not any(place.drivers)
     present = [0.0 if alone else 1.0 - spec.alone_share] * len(place.drivers)
     present[place.player] = 1.0

@@ -13,7 +13,8 @@ from harness.errors import UsageError
 from harness.evaluation.people import judged, judged_outcomes
 from harness.evaluation.trace_file import TraceReader
 from harness.evaluation.worst_first import FAILURES, worst_first
-from harness.export import ExportedGame, Formats, check_folder, check_formats, exported_game, write_games
+from harness.export.exported_game import ExportedGame, exported_game
+from harness.export.folder import Formats, check_folder, check_formats, write_games
 from harness.road.scene.open_scene import open_scene
 
 
