@@ -87,7 +87,7 @@ JIT_MAY_IMPORT = GAME_MAY_IMPORT | {
     "threading",
 }
 FILE_ACCESS_CALLS = {
-    *("fromfile", "genfromtxt", "load", "loadtxt", "memmap", "open", "save", "savetxt", "savez", "tofile"),
+    *("fromfile", "genfromtxt", "load", "loadtxt", "memmap", "open", "save", "savetxt", "savez", "tofile")
 }
 FORBIDDEN_WORDS = {"utils", "helpers", "common", "base", "core", "manager", "handler", "misc"}
 LONGEST = {".py": 350, ".jinja": 400, ".css": 400, ".js": 400}
@@ -373,8 +373,7 @@ def test_randomness__comes_from_a_generator_argument() -> None:
 
 
 @pytest.mark.parametrize(
-    "source",
-    ["import random", "from numpy.random import rand", "import numpy as np\nnp.random.shuffle([1])"],
+    "source", ["import random", "from numpy.random import rand", "import numpy as np\nnp.random.shuffle([1])"]
 )
 def test_randomness__a_global_source_is_seen(source: str) -> None:
     assert list(global_randomness(ast.parse(source)))

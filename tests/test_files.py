@@ -15,12 +15,8 @@ def test_write_atomically__writes_and_replaces(tmp_path: Path) -> None:
     write_atomically(file, b"old")
     write_atomically(file, b"new\x00")
     assert file.read_bytes() == b"new\x00"
+    assert file.stat().st_mode & 0o777 == 0o644
     assert [each.name for each in tmp_path.iterdir()] == ["table.csv"]
-
-
-def test_write_atomically__the_file_is_readable_for_all(tmp_path: Path) -> None:
-    write_atomically(tmp_path / "table.csv", b"")
-    assert (tmp_path / "table.csv").stat().st_mode & 0o777 == 0o644
 
 
 def test_write_atomically__a_failure_leaves_only_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

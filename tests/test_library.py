@@ -30,11 +30,6 @@ def test_run__prints_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) 
     assert capfd.readouterr() == ("", "")
 
 
-def test_load__a_folder_without_a_run_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(harness.UsageError):
-        harness.load(tmp_path)
-
-
 def test_table__a_name_that_the_run_has_not_is_refused(tmp_path: Path) -> None:
     with pytest.raises(harness.UsageError, match=r"none\.csv"):
         harness.Results(tmp_path).table("none")

@@ -40,9 +40,7 @@ def new_persona(
 
 
 @persona_app.command("check")
-def check_persona(
-    file: PersonaFile,
-) -> None:
+def check_persona(file: PersonaFile) -> None:
     """Check a persona: its document, and that its sources are evidence and not the text of the template."""
     from harness.cli import persona_template
 
@@ -77,9 +75,7 @@ def show_persona(
         print_plain([f"Page: {html}"], console)
 
 
-def new(
-    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="The new folder.")],
-) -> None:
+def new(folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="The new folder.")]) -> None:
     """Make a project: a campaign, a scene and a persona of your own, which run as they are, and a README."""
     from rich.console import Console
 

@@ -36,9 +36,7 @@ def _as_range(value: Any) -> Any:
 _Place = Annotated[float, Field(ge=-1e7, le=1e7)]
 Corner = tuple[_Place, _Place]
 NumberOrRange = Annotated[
-    Corner,
-    AfterValidator(ordered),
-    BeforeValidator(_as_range, json_schema_input_type=float | tuple[float, float]),
+    Corner, AfterValidator(ordered), BeforeValidator(_as_range, json_schema_input_type=float | tuple[float, float])
 ]
 """A number, or a range from which each game draws by its seed; read as a range."""
 

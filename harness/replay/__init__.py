@@ -6,11 +6,4 @@ from harness.replay.selection import choose_games, replay_name
 from harness.replay.sumo_gui import follow_in_sumo_gui
 from harness.replay.vehicles import names_in_pictures
 
-__all__ = [
-    "choose_games",
-    "follow_in_sumo_gui",
-    "names_in_pictures",
-    "replay_name",
-    "write_film",
-    "write_replay",
-]
+__all__ = ["choose_games", "follow_in_sumo_gui", "names_in_pictures", "replay_name", "write_film", "write_replay"]

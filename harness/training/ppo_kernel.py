@@ -13,14 +13,7 @@ import numpy as np
 
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.jit import compiled
-from harness.training.actor_critic_kernel import (
-    HALF_LOG_2PI,
-    Networks,
-    Workspace,
-    backward,
-    forward,
-    log_probabilities,
-)
+from harness.training.actor_critic_kernel import HALF_LOG_2PI, Networks, Workspace, backward, forward, log_probabilities
 
 LOSSES = 5
 """Numbers of a gradient step: policy loss, value loss, entropy loss, approximate KL divergence, clipped fraction."""

@@ -62,10 +62,7 @@ ego = { vehicle = "ego", lane = "road_0", position_m = [30.0, 40.0], speed_mps =
     ("people", "message"),
     [
         (PEOPLE * 5, "non_ego: 5 people; a scene has one to 4"),
-        (
-            PEOPLE.replace("[[non_ego]]", "[non_ego]"),
-            "non_ego: is one table (write [[non_ego]]",
-        ),
+        (PEOPLE.replace("[[non_ego]]", "[non_ego]"), "non_ego: is one table (write [[non_ego]]"),
         ("non_ego = []", "non_ego: 0 people; a scene has one to 4"),
         (PEOPLE + PEOPLE.replace("30.0", '"far"'), "non_ego_2.position_m"),
         (PEOPLE + PEOPLE + 'colour = "red"', "non_ego_2.colour: unknown key"),

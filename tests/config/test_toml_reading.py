@@ -94,14 +94,6 @@ def only(path: Path, model: type[Document]) -> tuple[str, str]:
     return problem.key, f"{problem.message} ({problem.remedy})" if problem.remedy else problem.message
 
 
-def test_documents__of_this_repository_are_valid(repository: Path) -> None:
-    for folder, model in (("personas", Persona), ("campaigns", Campaign)):
-        for path in sorted((repository / folder).glob("*.toml")):
-            assert read_document(path, model)
-    for path in sorted((repository / "networks").glob("*/scene.toml")):
-        assert read_document(path, Scene)
-
-
 def test_campaign__defaults_are_the_papers_table_1(write: Write) -> None:
     training = read_document(write(CAMPAIGN), Campaign).training
     values = (training.steps, training.early_convergence, training.discount, training.clip)

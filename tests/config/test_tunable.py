@@ -60,9 +60,7 @@ def test_tunable__undeclared_parameters_are_not_searched(text: str, tmp_path: Pa
         read(text, tmp_path).tuned({"cruise.time_gap_s": 1.0})
 
 
-def test_tunable__rules_have_defaults_that_contain_the_values_of_the_document(
-    tmp_path: Path,
-) -> None:
+def test_tunable__rules_have_defaults_that_contain_the_values_of_the_document(tmp_path: Path) -> None:
     default = {each.key: each for each in read(RULES, tmp_path).searched}
     assert default["cruise.time_gap_s"] == Tunable("cruise.time_gap_s", 0.8, 2.5)
     wider = {each.key: each for each in read(RULES.replace("1.8", "3.9"), tmp_path).searched}
@@ -127,11 +125,6 @@ def test_identity__does_not_contain_what_is_tunable(tmp_path: Path) -> None:
     declared = find(document(tmp_path, RULES + '[tunable]\n"cruise.time_gap_s" = [0.8, 2.5]\n'), tmp_path)
     assert declared.identity == rules.identity  # the bounds do not change the driver
     assert declared.tuned({"cruise.time_gap_s": 2.0}).identity != rules.identity
-
-
-def test_identity__of_a_program_changes_with_its_parameters(tmp_path: Path) -> None:
-    identities = [find(document(tmp_path, PROCESS.replace("1.5", gap)), tmp_path).identity for gap in ("1.5", "1.6")]
-    assert identities[0] != identities[1]
 
 
 def test_document_in__names_the_same_files_from_another_folder(tmp_path: Path) -> None:

@@ -84,9 +84,8 @@ def test_lane_left__is_the_rest_of_the_lane_at_the_crossing_of_the_line(merge: O
 
     assert measured("lane_left_m", merge, crossing(70.0)) == pytest.approx(30.0, abs=0.3)
     assert measured("lane_left_m", merge, crossing(108.0)) == pytest.approx(-8.0, abs=0.3)
-    assert measured("lane_left_m", merge, crossing(70.0), crossing(80.0), crossing(99.0)) == pytest.approx(
-        20.0, abs=0.3
-    )
+    median = measured("lane_left_m", merge, crossing(70.0), crossing(80.0), crossing(99.0))
+    assert median == pytest.approx(20.0, abs=0.3)
     assert np.isnan(measured("lane_left_m", merge, trace({"y_m": LANE_1_M}, {"y_m": LANE_1_M})))  # the lane goes on
 
 
@@ -116,10 +115,7 @@ def run(tmp_path: Path, merge: OpenScene) -> Path:
     write(tmp_path / "traces" / "naive_vs_tailgater-seed1.parquet", merge, close)
     games = [
         episode("naive_alone", None, False),
-        *(
-            episode("tailgater_alone", "tailgater", None, np.nan, outcome)
-            for outcome in ("goal", "rail", "goal", "goal")
-        ),
+        *(episode("tailgater_alone", "tailgater", None, np.nan, end) for end in ("goal", "rail", "goal", "goal")),
         episode("naive_vs_tailgater", "tailgater", True),
         episode("naive_vs_tailgater", "tailgater", False, 12.0),
         {**episode("naive_vs_tailgater", "tailgater", None, np.nan, "error"), "error": "the simulator died"},
@@ -131,9 +127,8 @@ def run(tmp_path: Path, merge: OpenScene) -> Path:
     other_seed = {**episode("naive_vs_tailgater", "tailgater", True), "seed": 2}
     pd.DataFrame([*games, other_seed]).to_csv(tmp_path / "episodes.csv", index=False)
     curve = [("tailgater", payoff) for payoff in (-10.0, 0.0, 3.0, 4.0, 5.0)] + [("retrained_tailgater", 99.0)]
-    pd.DataFrame([{"stage": stage, "seed": 1, "mean_payoff": payoff} for stage, payoff in curve]).to_csv(
-        tmp_path / "training.csv", index=False
-    )
+    training = pd.DataFrame([{"stage": stage, "seed": 1, "mean_payoff": payoff} for stage, payoff in curve])
+    training.to_csv(tmp_path / "training.csv", index=False)
     return tmp_path
 
 

@@ -38,14 +38,6 @@ def text_of(page: Path) -> str:
     return re.sub(r"<[^>]+>", "", page.read_text(encoding="utf-8"))
 
 
-def test_site__has_every_page_of_docs(site: Path) -> None:
-    docs = REPOSITORY / "docs"
-    assert (site / "index.html").is_file()
-    assert [
-        page for page in docs.rglob("*.md") if not (site / page.relative_to(docs)).with_suffix(".html").is_file()
-    ] == []
-
-
 def test_reference__has_every_public_name_command_and_key(site: Path) -> None:
     python, commands = text_of(site / "reference" / "api.html"), text_of(site / "reference" / "cli.html")
     assert [name for name in harness.__all__ if f"harness.{name}" not in python] == []

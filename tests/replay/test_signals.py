@@ -11,13 +11,10 @@ import pandas as pd
 import pytest
 from defusedxml import ElementTree
 
-from harness.drivers.sumo import SumoDriver
 from harness.replay import write_replay
 from harness.replay.scenery import programmes
-from harness.road.scene.open_scene import open_scene
 from tests.support.replays import STEP_S, drive, straight, sumo_program
 from tests.support.repository import REPOSITORY
-from tests.support.rollouts import arm, play, trace
 from tests.support.tiny import PATIENCE_S
 
 LEFT_ACROSS = REPOSITORY / "networks" / "left_across"
@@ -71,19 +68,6 @@ def test_replay__each_frame_has_the_lights_of_the_trace(tmp_path: Path) -> None:
     assert {
         step: f"{light}={states[step + 1]}" for step in texts
     } == texts  # SUMO shows the game's step k in its step k + 1
-
-
-def test_replay__of_a_game_that_was_played_has_its_lights(tmp_path: Path) -> None:
-    """Each game starts at another place in the cycle, and the replay follows it."""
-    scene, (light, _) = open_scene(LEFT_ACROSS), light_of(LEFT_ACROSS / "left_across.net.xml")
-    firsts = set()
-    for number, game in enumerate(play(arm(scene, SumoDriver(), SumoDriver()), episodes=3)):
-        recorded = trace(game)
-        states = shown(write(recorded, tmp_path / str(number) / "replay"), light)
-        texts = dict(zip(recorded["step"], recorded["signals"], strict=True))
-        assert {step: f"{light}={states[step + 1]}" for step in texts} == texts
-        firsts.add(texts[0])
-    assert len(firsts) > 1
 
 
 def test_replay__without_recorded_lights_keeps_the_nets(tmp_path: Path) -> None:

@@ -22,12 +22,7 @@ from harness.training.checkpoint import CurvePoint, Progress, read_checkpoint, w
 KEY = "key"
 POINT = CurvePoint(steps=8, mean_payoff=1.5, failure_rate=0.25, games=4, mean_duration_s=3.0)
 PROGRESS = Progress(
-    segments=2,
-    steps=16,
-    segment_payoffs=[-float("inf"), 1.5],
-    curve=[POINT],
-    alone_games=[0, 4],
-    alone_failures=[0, 1],
+    segments=2, steps=16, segment_payoffs=[-float("inf"), 1.5], curve=[POINT], alone_games=[0, 4], alone_failures=[0, 1]
 )
 Tensors = dict[str, torch.Tensor]
 Metadata = dict[str, str]

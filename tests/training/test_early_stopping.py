@@ -8,14 +8,7 @@ import numpy as np
 import pytest
 
 from harness.config.training import Training
-from harness.training.early_stopping import (
-    LATEST,
-    LEAST,
-    MOST_FAILURES,
-    Narrowing,
-    has_converged,
-    still_fails,
-)
+from harness.training.early_stopping import LATEST, LEAST, MOST_FAILURES, Narrowing, has_converged, still_fails
 
 ZEROS, ONES = [0.0] * LATEST, [1.0] * LATEST
 NO_GAME = -math.inf

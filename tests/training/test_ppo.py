@@ -197,44 +197,43 @@ def test_train__alone_share_is_the_share_of_games_without_opponent(
     assert sum(progress.alone_games) / ended == pytest.approx(share, abs=tolerance)
 
 
-@pytest.mark.parametrize(("share", "lapsing"), [(0.0, [True] * 3), (0.5, [False, False, True])])
-def test_train__lapses_of_attention_start_after_the_attentive_share(
-    share: float, lapsing: list[bool], alone: TrainingSpec, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    seen: list[bool] = []
+def samplings(monkeypatch: pytest.MonkeyPatch) -> list[StartDistribution]:
+    """The start distributions of the segments of a training, as it begins them."""
+    sampled: list[StartDistribution] = []
     sample_from = ArenaVecEnv.sample_from
 
     def recording(environment: ArenaVecEnv, start_distribution: StartDistribution, *parts: str | int) -> None:
         if "segment" in parts:
-            seen.append(
-                any(each.attention is not None for of_player in start_distribution.human_factors for each in of_player)
-            )
+            sampled.append(start_distribution)
         sample_from(environment, start_distribution, *parts)
 
     monkeypatch.setattr(ArenaVecEnv, "sample_from", recording)
+    return sampled
+
+
+@pytest.mark.parametrize(("share", "lapsing"), [(0.0, [True] * 3), (0.5, [False, False, True])])
+def test_train__lapses_of_attention_start_after_the_attentive_share(
+    share: float, lapsing: list[bool], alone: TrainingSpec, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sampled = samplings(monkeypatch)
     distracted = mixture_of(SumoDriver(), read_document(DISTRACTED, Persona))
     in_one_go(beside(alone, EGO, distracted, attentive_share=share), tmp_path)
-    assert seen == lapsing
+    factors = [[each for of_player in starts.human_factors for each in of_player] for starts in sampled]
+    assert [any(each.attention is not None for each in of_game) for of_game in factors] == lapsing
 
 
 @pytest.mark.parametrize("learner", [EGO, NON_EGO])
 def test_train__the_learner_checks_its_blind_spot_and_the_opponent_does_not(
     learner: int, alone: TrainingSpec, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    seen: list[list[float]] = []
-    sample_from = ArenaVecEnv.sample_from
-
-    def recording(environment: ArenaVecEnv, start_distribution: StartDistribution, *parts: str | int) -> None:
-        seen.append([each.sight.no_blind_spot_check_share for (each,) in start_distribution.human_factors])
-        sample_from(environment, start_distribution, *parts)
-
-    monkeypatch.setattr(ArenaVecEnv, "sample_from", recording)
+    sampled = samplings(monkeypatch)
     speedy = read_document(SPEEDY, Persona)
     share = speedy.human_factors.sight.no_blind_spot_check_share
     assert share > 0.0
     in_one_go(beside(alone, learner, mixture_of(SumoDriver(), speedy), persona=speedy), tmp_path)
-    assert seen
-    assert all(shares[learner] == 0.0 and shares[1 - learner] == share for shares in seen)
+    shares = [[each.sight.no_blind_spot_check_share for (each,) in starts.human_factors] for starts in sampled]
+    assert shares
+    assert all(each[learner] == 0.0 and each[1 - learner] == share for each in shares)
 
 
 def test_train__the_deviation_of_actions_is_bounded(alone: TrainingSpec, tmp_path: Path) -> None:
