@@ -13,7 +13,7 @@ from typing import Any
 
 from benchmarks.profiler import Profiler
 from benchmarks.training import endless_training, training_spec
-from harness.drivers.policy import LearnedDriver
+from harness.drivers.policy_file import LearnedDriver
 from harness.environments.arena import Arena
 from harness.environments.auto_reset import AutoReset
 from harness.sumo.libsumo_simulation import LibsumoSimulation

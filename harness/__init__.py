@@ -15,7 +15,7 @@ from harness.version import __version__ as __version__
 if TYPE_CHECKING:
     from harness.config.persona import Persona as Persona
     from harness.config.toml_reading import read_document as read_document
-    from harness.drivers.policy import LearnedDriver as LearnedDriver
+    from harness.drivers.policy_file import LearnedDriver as LearnedDriver
     from harness.drivers.policy_file import Policy as Policy
     from harness.drivers.policy_file import read_policy as read_policy
     from harness.drivers.protocol import Driver as Driver
@@ -41,8 +41,7 @@ if TYPE_CHECKING:
 _MODULES = {
     "config.persona": ("Persona",),
     "config.toml_reading": ("read_document",),
-    "drivers.policy": ("LearnedDriver",),
-    "drivers.policy_file": ("Policy", "read_policy"),
+    "drivers.policy_file": ("LearnedDriver", "Policy", "read_policy"),
     "drivers.protocol": ("Driver",),
     "drivers.sumo": ("SumoDriver",),
     "environments.arena": ("Arena", "Seat", "Step"),

@@ -12,8 +12,7 @@ from harness.drivers.driver_files import resolve_in
 from harness.drivers.entry_points import entry_point, installed_driver
 from harness.drivers.fmu import fmu_driver
 from harness.drivers.network_driver import NetworkDriver
-from harness.drivers.policy import LearnedDriver
-from harness.drivers.policy_file import read_policy
+from harness.drivers.policy_file import LearnedDriver, read_policy
 from harness.drivers.process import ProcessDriver
 from harness.drivers.protocol import Driver
 from harness.drivers.rules_driver import RulesDriver

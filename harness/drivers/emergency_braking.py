@@ -35,7 +35,7 @@ def emergency(
     brakes = law.brakes_ttc_s * np.where(braking, _RELEASE_FACTOR, 1.0)
     warns = np.maximum(brakes, law.brakes_ttc_s + law.warns_before_s)
     in_path = encounters.clearance_m - np.minimum(time, warns) * np.maximum(encounters.approach_mps, 0.0) <= 0.0
-    danger = encounters.seen & (encounters.ahead_m > 0.0) & (encounters.gap_m > 0.0) & in_path & (time <= warns)
+    danger = _ahead(encounters) & (encounters.gap_m > 0.0) & in_path & (time <= warns)
     return danger, np.where(time <= brakes, law.braking_mps2, law.warning_braking_mps2)
 
 
@@ -51,9 +51,7 @@ def careful_and_competent(
     next_to = np.abs(encounters.offset_m) < 1.5 * law.lane_width_m
     time = time_to_collision_s(encounters.gap_m, own_mps - encounters.speed_mps)
     near = time <= law.ttc_s * np.where(braking, _RELEASE_FACTOR, 1.0)
-    danger = (
-        encounters.seen & (encounters.ahead_m > 0.0) & ((next_to & cuts_in) | (encounters.clearance_m <= 0.0)) & near
-    )
+    danger = _ahead(encounters) & ((next_to & cuts_in) | (encounters.clearance_m <= 0.0)) & near
     wrapped = np.abs(encounters.offset_m) <= law.wrapped_m
     return danger, GRAVITY_MPS2 * np.where(wrapped, law.wrapped_braking_g, law.full_braking_g)
 
@@ -84,12 +82,8 @@ def rss(encounters: Encounters, own_mps: FloatArray, law: Rss) -> tuple[BoolArra
     et al. 2022 (Accident Analysis & Prevention 174, 106743).
     """
     near = encounters.gap_m < rss_gap_m(own_mps, encounters.speed_mps, law)
-    danger = (
-        encounters.seen
-        & (encounters.ahead_m > 0.0)
-        & near
-        & (encounters.clearance_m < rss_clearance_m(encounters.approach_mps, law))
-    )
+    beside = encounters.clearance_m < rss_clearance_m(encounters.approach_mps, law)
+    danger = _ahead(encounters) & near & beside
     return danger, np.full(danger.shape, law.full_braking_g * GRAVITY_MPS2)
 
 
@@ -122,11 +116,8 @@ def critical(
     after = closing + law.reaction_s * acceleration
     meanwhile = 0.5 * law.reaction_s * (closing + after)
     squared = np.maximum(after, 0.0) ** 2
-    graded = _share_of(
-        gap_m,
-        meanwhile + squared / (2.0 * law.comfortable_mps2),
-        meanwhile + squared / (2.0 * law.hardest_mps2),
-    )
+    safe, unsafe = (meanwhile + squared / (2.0 * braking) for braking in (law.comfortable_mps2, law.hardest_mps2))
+    graded = _share_of(gap_m, safe, unsafe)
     slowed = gap_m < closing**2 / np.maximum(2.0 * np.abs(own_mps2), 1e-9)
     return np.where(closing <= 0.0, 0.0, np.where(after < 0.0, slowed.astype(float), graded))
 
@@ -141,12 +132,16 @@ def fuzzy(
         pass_s = (np.abs(encounters.ahead_m) + encounters.lengths_m) / closing
         enter_s = encounters.clearance_m / encounters.approach_mps
     enters = (encounters.approach_mps > 0.0) & (closing > 0.0) & (enter_s <= pass_s + law.lateral_margin_s)
-    relevant = encounters.seen & (encounters.ahead_m > 0.0) & ((encounters.clearance_m <= 0.0) | enters)
+    relevant = _ahead(encounters) & ((encounters.clearance_m <= 0.0) | enters)
     pfs = proactive(encounters.gap_m, own_mps=own_mps, other_mps=encounters.speed_mps, law=law)
     cfs = critical(encounters.gap_m, own_mps=own_mps, own_mps2=own_mps2, other_mps=encounters.speed_mps, law=law)
     graded = law.comfortable_mps2 + cfs * (law.hardest_mps2 - law.comfortable_mps2)
     braking = np.where(cfs > 0.0, graded, pfs * law.comfortable_mps2)
     return relevant & (braking > 0.0), np.minimum(braking, law.full_braking_g * GRAVITY_MPS2)
+
+
+def _ahead(encounters: Encounters) -> BoolArray:
+    return encounters.seen & (encounters.ahead_m > 0.0)
 
 
 def _share_of(gap_m: FloatArray, safe_m: FloatArray, unsafe_m: FloatArray) -> FloatArray:

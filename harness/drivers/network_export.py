@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -46,10 +46,15 @@ def export_network(driver: ExternalDriver, out: Path) -> float:
     with torch.no_grad(), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of tracing: the branches of a policy don't depend on the observation
         expected = network(seen).numpy()
-        if ending == ".onnx":
-            _write_onnx(network, seen[:2], out)
-        else:
+        if ending == ".pt":
             torch.jit.trace(network, (seen[:2],)).save(str(out))
+        else:
+            names = {"input_names": ["observation"], "output_names": ["action"]}
+            games = {"observation": {0: "games"}, "action": {0: "games"}}
+            try:  # dynamo: the newer exporter needs one more package
+                torch.onnx.export(network, (seen[:2],), str(out), **names, dynamic_axes=games, dynamo=False)
+            except ImportError as error:
+                raise UsageError.of(out, "", str(error), "pip install 'safedriverl-harness[onnx]'") from None
     kind: type[Onnx] | type[TorchScript] = Onnx if ending == ".onnx" else TorchScript
     document = kind.model_validate({"kind": KINDS[ending], "file": out.name})
     decided = np.asarray(read_network(document, out)(seen.numpy(), np.zeros((_COMPARED, ACTIONS))))
@@ -58,24 +63,6 @@ def export_network(driver: ExternalDriver, out: Path) -> float:
         what = f"it decides otherwise than the policy, by up to {difference:.3g}"
         raise UsageError.of(out, "", what, "the policy has a part that can't be traced: export it by its own library")
     return difference
-
-
-def _write_onnx(network: Any, example: Any, out: Path) -> None:
-    import torch
-
-    games = {0: "games"}
-    try:
-        torch.onnx.export(
-            network,
-            (example,),
-            str(out),
-            input_names=["observation"],
-            output_names=["action"],
-            dynamic_axes={"observation": games, "action": games},
-            dynamo=False,  # the newer exporter needs one more package
-        )
-    except ImportError as error:
-        raise UsageError.of(out, "", str(error), "pip install 'safedriverl-harness[onnx]'") from None
 
 
 def _network_of(driver: ExternalDriver) -> torch.nn.Module:
@@ -110,6 +97,8 @@ def _of_sb3(driver: ExternalDriver, document: StableBaselines3) -> torch.nn.Modu
     saved = read_sb3_policy(document, resolve_in(driver.place, document.file), normalize)
     actions = torch.tensor(document.actions, dtype=torch.float32)
 
+    normalised = saved.scaling is not None and saved.scaling.norm_obs
+
     class Whole(torch.nn.Module):
         """The policy with what it needs before and after it."""
 
@@ -119,15 +108,14 @@ def _of_sb3(driver: ExternalDriver, document: StableBaselines3) -> torch.nn.Modu
         def __init__(self) -> None:
             super().__init__()
             self.policy = saved.policy
-            self.scaled = saved.scaling is not None and saved.scaling.norm_obs
-            if self.scaled:
+            if normalised:
                 moments = saved.scaling.obs_rms
-                self.register_buffer("mean", torch.tensor(moments.mean, dtype=torch.float32))
                 deviation = np.sqrt(moments.var + saved.scaling.epsilon)
-                self.register_buffer("deviation", torch.tensor(deviation, dtype=torch.float32))
+                for name, values in (("mean", moments.mean), ("deviation", deviation)):
+                    self.register_buffer(name, torch.tensor(values, dtype=torch.float32))
 
         def forward(self, observation: torch.Tensor) -> torch.Tensor:
-            if self.scaled:
+            if normalised:
                 largest = float(saved.scaling.clip_obs)
                 observation = torch.clamp((observation - self.mean) / self.deviation, -largest, largest)
             decided: torch.Tensor = self.policy._predict(observation, deterministic=True)

@@ -3,7 +3,7 @@ in metres."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,8 +12,7 @@ from harness.game.arrays import BoolArray, FloatArray
 from harness.game.observation_layout import ENTRIES, LAYOUT, OTHERS
 from harness.game.road import AHEAD_M
 
-_AT = {name: LAYOUT.index(name) for name in LAYOUT}
-_TURNED, _BEND, _OTHER = _AT["path_turned_rad@0m"], _AT["path_bend_per_m@0m"], _AT["other0_seen"]
+_TURNED, _BEND, _OTHER = map(LAYOUT.index, ("path_turned_rad@0m", "path_bend_per_m@0m", "other0_seen"))
 
 
 class Encounters(NamedTuple):
@@ -63,29 +62,19 @@ class OwnMotion(NamedTuple):
     signal_yellow: BoolArray
 
 
+_OWN = {name: LAYOUT.index(name) for name in OwnMotion._fields if name in LAYOUT}
+
+
 def perceive(car: Car, observation: FloatArray) -> tuple[OwnMotion, Encounters]:
     """Own motion and other road users in N games, from observations [N, SIZE]."""
     values = car.physical(observation)
-
-    def entry(name: str) -> FloatArray:
-        return values[:, _AT[name]]
-
-    motion = OwnMotion(
-        speed_mps=entry("speed_mps"),
-        limit_mps=entry("speed_limit_mps"),
-        acceleration_mps2=entry("acceleration_mps2"),
-        steering_rad=entry("steering_rad"),
-        road_steering_rad=entry("road_steering_rad"),
-        path_left_m=entry("path_left_m"),
-        path_turned_rad=values[:, _TURNED : _TURNED + len(AHEAD_M)],
-        path_bend_per_m=values[:, _BEND : _BEND + len(AHEAD_M)],
-        stop_line_m=entry("stop_line_m"),
-        stop_sign=entry("stop_sign") > 0.5,
-        signal_red=entry("signal_red") > 0.5,
-        signal_yellow=entry("signal_yellow") > 0.5,
-    )
-    others = values[:, _OTHER:].reshape(len(values), OTHERS, ENTRIES)
-    return motion, _encounters(car, motion, others)
+    own: dict[str, Any] = {name: values[:, k] for name, k in _OWN.items()}
+    own |= {name: own[name] > 0.5 for name in ("stop_sign", "signal_red", "signal_yellow")}
+    turned = values[:, _TURNED : _TURNED + len(AHEAD_M)]
+    bend = values[:, _BEND : _BEND + len(AHEAD_M)]
+    limit = values[:, LAYOUT.index("speed_limit_mps")]
+    motion = OwnMotion(**own, limit_mps=limit, path_turned_rad=turned, path_bend_per_m=bend)
+    return motion, _encounters(car, motion, values[:, _OTHER:].reshape(len(values), OTHERS, ENTRIES))
 
 
 def _encounters(car: Car, motion: OwnMotion, others: FloatArray) -> Encounters:
@@ -100,6 +89,7 @@ def _encounters(car: Car, motion: OwnMotion, others: FloatArray) -> Encounters:
     half_length = 0.5 * (length * turned_cos + width * turned_sin)
     half_width = 0.5 * (length * turned_sin + width * turned_cos)
     lengths = half_length + 0.5 * car.length_m
+    meets, arrives_s = priority != 0.0, np.maximum(other_m, 0.0) / np.maximum(np.hypot(forward, across), 0.1)
     leftwards = across * along_cos - forward * along_sin
     return Encounters(
         seen=seen > 0.5,
@@ -110,10 +100,8 @@ def _encounters(car: Car, motion: OwnMotion, others: FloatArray) -> Encounters:
         speed_mps=forward * along_cos + across * along_sin,
         approach_mps=-np.sign(offset) * leftwards,
         lengths_m=lengths,
-        own_to_conflict_m=np.where(priority != 0.0, own_m, np.inf),
-        other_to_conflict_s=np.where(
-            priority != 0.0, np.maximum(other_m, 0.0) / np.maximum(np.hypot(forward, across), 0.1), np.inf
-        ),
+        own_to_conflict_m=np.where(meets, own_m, np.inf),
+        other_to_conflict_s=np.where(meets, arrives_s, np.inf),
         has_priority=priority > 0.5,
     )
 

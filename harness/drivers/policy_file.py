@@ -1,4 +1,5 @@
-"""A learned policy on disk: parameters as safetensors, metadata as JSON. Opening a policy runs no code.
+"""A learned policy on disk and as a driver: parameters as safetensors, metadata as JSON. Opening a policy runs no code,
+and driving by one needs no framework.
 
 <name>/policy.safetensors    actor.<k>.weight [out, in], actor.<k>.bias [out], log_deviation [2]; critic likewise
 <name>/policy.json           format, description of the training, names of the observation's entries
@@ -24,7 +25,7 @@ from harness.config.persona import Persona
 from harness.config.toml_reading import nearest
 from harness.errors import UsageError
 from harness.files import content_of, write_atomically
-from harness.game.arrays import FloatArray
+from harness.game.arrays import FloatArray, IntArray
 from harness.game.observation_layout import LAYOUT
 
 FORMAT = 1
@@ -59,6 +60,36 @@ class Policy:
         """Weights [out, in] and biases [out] of `actor` or `critic`, in order."""
         count = sum(name.startswith(f"{part}.") and name.endswith(".weight") for name in self.tensors)
         return [(self.tensors[f"{part}.{k}.weight"], self.tensors[f"{part}.{k}.bias"]) for k in range(count)]
+
+
+class LearnedDriver:
+    """Drives by a policy: by its most likely action, or by a sample of its distribution.
+
+    >>> import harness, numpy as np
+    >>> driver = harness.LearnedDriver(harness.read_policy("policies/merge/naive-seed1"), sampled=False)
+    >>> driver.decide(games=np.arange(3), observation=np.zeros((3, 98)), noise=np.zeros((3, 2))).shape
+    (3, 2)
+    """
+
+    takes_over = True
+
+    def __init__(self, policy: Policy, sampled: bool) -> None:
+        self._layers = [(weight.T.copy(), bias) for weight, bias in policy.layers("actor")]
+        self._deviation = np.exp(policy.tensors["log_deviation"]) if sampled else None
+
+    def reset(self, games: IntArray) -> None:
+        """Do nothing: each decision depends on the current observation only."""
+
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        """Actions [N, 2] from observations [N, SIZE]; `noise` [N, 2] is used if decisions are sampled."""
+        hidden = observation
+        for weight, bias in self._layers[:-1]:
+            hidden = np.tanh(hidden @ weight + bias)
+        weight, bias = self._layers[-1]
+        action = hidden @ weight + bias
+        if self._deviation is not None:
+            action = action + self._deviation * noise
+        return np.clip(action, -1.0, 1.0)
 
 
 def write_policy(policy: Policy, folder: Path) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from harness.drivers.policy import LearnedDriver
+from harness.drivers.policy_file import LearnedDriver
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Step
 from harness.errors import SimulationError

@@ -34,8 +34,7 @@ from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.car import car_of
 from harness.drivers.mixture import Member, Mixture, mixture_of
-from harness.drivers.policy import LearnedDriver
-from harness.drivers.policy_file import Policy, write_policy
+from harness.drivers.policy_file import LearnedDriver, Policy, write_policy
 from harness.drivers.protocol import Driver
 from harness.evaluation.game_theory.best_response_gap import (
     NOTHING_TO_GAIN,

@@ -10,8 +10,7 @@ import pytest
 import torch
 from stable_baselines3 import PPO
 
-from harness.drivers.policy import LearnedDriver
-from harness.drivers.policy_file import Policy
+from harness.drivers.policy_file import LearnedDriver, Policy
 from harness.drivers.protocol import Driver
 from harness.drivers.sumo import SumoDriver
 from harness.environments.vector_env import ACTION_SPACE, OBSERVATION_SPACE

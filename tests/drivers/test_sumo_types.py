@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from harness.assessment.rollout import Game
-from harness.drivers.policy import LearnedDriver
+from harness.drivers.policy_file import LearnedDriver
 from harness.drivers.sumo import SumoDriver
 from harness.errors import UsageError
 from harness.road.scene.open_scene import open_scene

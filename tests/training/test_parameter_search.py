@@ -18,8 +18,7 @@ from harness.config.training import Reconfiguration
 from harness.config.tunable import Tunable
 from harness.drivers.car import car_of
 from harness.drivers.mixture import Mixture, mixture_of
-from harness.drivers.policy import LearnedDriver
-from harness.drivers.policy_file import read_policy
+from harness.drivers.policy_file import LearnedDriver, read_policy
 from harness.drivers.protocol import Driver
 from harness.errors import StageFailed
 from harness.game.arrays import FloatArray, IntArray

@@ -19,8 +19,7 @@ from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.config.training import Training
 from harness.drivers.mixture import mixture_of
-from harness.drivers.policy import LearnedDriver
-from harness.drivers.policy_file import write_policy
+from harness.drivers.policy_file import LearnedDriver, write_policy
 from harness.drivers.sumo import SumoDriver
 from harness.environments.vector_env import ArenaVecEnv
 from harness.game.initial_state import StartDistribution

@@ -18,8 +18,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from harness.assessment.rollout import SeatedArm
-from harness.assessment.start_trials import StartTrials
+from harness.assessment.rollout import SeatedArm, StartTrials
 from harness.campaign.execution.run_players import RunPlayers, SeatedDriver
 from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.storage.run_folder import RunFolder

@@ -33,8 +33,7 @@ from harness.config.driver import read_driver
 from harness.config.tunable import Adjustable
 from harness.drivers.car import car_of
 from harness.drivers.mixture import Member, Mixture
-from harness.drivers.policy import LearnedDriver
-from harness.drivers.policy_file import read_policy
+from harness.drivers.policy_file import LearnedDriver, read_policy
 from harness.drivers.protocol import Driver
 from harness.drivers.sumo import SumoDriver
 from harness.errors import StageFailed

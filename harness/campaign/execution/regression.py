@@ -11,8 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.assessment.rollout import SeatedArm
-from harness.assessment.start_trials import StartTrials
+from harness.assessment.rollout import SeatedArm, StartTrials
 from harness.config.campaign import SUMO, resolve
 from harness.config.persona import Persona
 from harness.config.pinned_game import PinnedGame, PinnedPerson
@@ -20,8 +19,7 @@ from harness.config.toml_reading import read_document
 from harness.drivers.car import car_of
 from harness.drivers.external import find_driver
 from harness.drivers.mixture import Mixture, mixture_of
-from harness.drivers.policy import LearnedDriver
-from harness.drivers.policy_file import policy_files, read_policy
+from harness.drivers.policy_file import LearnedDriver, policy_files, read_policy
 from harness.drivers.protocol import Driver
 from harness.drivers.sumo import SumoDriver
 from harness.errors import Problem, UsageError, collect
