@@ -148,10 +148,8 @@ def test_emergency__warns_and_then_brakes() -> None:
 
 def test_react__waits_for_the_reaction_time_and_builds_up() -> None:
     """0.75 s of coasting, then 12.65 m/s^3 up to 0.774 g: full after 0.6 s."""
-    state, parameters = (
-        ReactionState(*np.zeros((3, 1))),
-        BrakeReaction(reaction_s=0.75, jerk_mps3=12.65, coasting_mps2=0.4),
-    )
+    state = ReactionState(*np.zeros((3, 1)))
+    parameters = BrakeReaction(reaction_s=0.75, jerk_mps3=12.65, coasting_mps2=0.4)
     seen = []
     for _ in range(16):
         state, reacting, braking = react(

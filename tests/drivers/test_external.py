@@ -194,13 +194,9 @@ def test_plan__an_ego_without_tunable_parameters_gets_rounds_0_and_1(driver: obj
     write_policy(some_policy(), tmp_path / "policy")
     opened = open_campaign(write_campaign(tmp_path, ego=ego(driver)), allow_code=True)
     stages = plan(opened.document, ["speedy"], opened.tunable)
+    arms = [f"{name}-seed1" for name in ("naive_alone", "naive_vs_sumo", "speedy_alone", "naive_vs_speedy")]
     assert [stage.id for stage in stages if isinstance(stage, TrainingStage)] == ["speedy-seed1"]
-    assert [stage.id for stage in stages if not isinstance(stage, TrainingStage)] == [
-        "naive_alone-seed1",
-        "naive_vs_sumo-seed1",
-        "speedy_alone-seed1",
-        "naive_vs_speedy-seed1",
-    ]
+    assert [stage.id for stage in stages if not isinstance(stage, TrainingStage)] == arms
 
 
 # --- whole campaigns ---
@@ -212,18 +208,13 @@ def played(folder: Path, driver: object, *options: object, **changes: Any) -> tu
     run = folder / "run"
     done = harness("campaign", campaign, "--out", run, *options)
     assert done.returncode == 0, done.stdout + done.stderr
-    return (
-        run,
-        json.loads((run / "manifest.json").read_text()),
-        pd.read_csv(run / "episodes.csv", keep_default_na=False),
-    )
+    episodes = pd.read_csv(run / "episodes.csv", keep_default_na=False)
+    return run, json.loads((run / "manifest.json").read_text()), episodes
 
 
 def check_rounds(run: Path, manifest: dict[str, Any], episodes: pd.DataFrame, in_words: str) -> None:
     """The non-ego was trained against the ego, all arms were assessed, and the report names the ego and the rounds."""
-    assert {name: entry["status"] for name, entry in manifest["stages"].items()} == dict.fromkeys(
-        manifest["stages"], "done"
-    )
+    assert {entry["status"] for entry in manifest["stages"].values()} == {"done"}
     assert set(episodes["arm"]) == {"naive_alone", "naive_vs_sumo", "speedy_alone", "naive_vs_speedy"}
     assert set(episodes["error"]) == {""}
     assert manifest["ego_driver"]["in_words"] == in_words

@@ -188,15 +188,6 @@ def test_fmu__a_single_instance_fmu_plays_one_game_at_a_time(tmp_path: Path, car
         driver.reset(GAMES)
 
 
-def test_fmu__an_error_status_is_reported(tmp_path: Path, car: Car) -> None:
-    build = fmu_example()
-    source = build.SOURCE.read_text().replace("step(twin, step_s);\n    return fmi2OK;", "return fmi2Error;")
-    driver = fmu_driver(document(), build.build(tmp_path / "failing.fmu", 2, source), car)
-    driver.reset(GAMES)
-    with pytest.raises(DriverError, match=r"failing\.fmu reports an error: .*fmi2DoStep"):
-        driver.decide(GAMES, np.zeros((3, SIZE), dtype=np.float32), np.zeros((3, 2)))
-
-
 ENUMERATED = """<TypeDefinitions><SimpleType name="Mode"><Enumeration>
 <Item name="eco" value="1"/><Item name="sport" value="3"/></Enumeration></SimpleType>
 </TypeDefinitions><ModelVariables>"""

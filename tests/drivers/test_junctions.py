@@ -94,12 +94,9 @@ def test_cruise__rolls_up_to_a_stop_sign(car: Car) -> None:
     """At the line half a metre per second, before it the speed of half of its strongest braking."""
 
     def requested(line_m: float, speed_mps: float) -> float:
-        view = observation_of(
-            {"speed_mps": speed_mps, "speed_limit_mps": 13.9, "stop_line_m": line_m, "stop_sign": 1.0}
-        )
-        motion, encounters = perceive(car, view)
-        found = cruise_mps2(motion, encounters, before_mps2=np.zeros(1), law=LAW, step_s=1000.0)
-        return float(found[0])
+        seen = {"speed_mps": speed_mps, "speed_limit_mps": 13.9, "stop_line_m": line_m, "stop_sign": 1.0}
+        perceived = perceive(car, observation_of(seen))
+        return float(cruise_mps2(*perceived, before_mps2=np.zeros(1), law=LAW, step_s=1000.0)[0])
 
     for line_m in (0.0, 4.0, 20.0):
         rolling = np.sqrt(0.25 + 3.5 * line_m)
@@ -128,13 +125,11 @@ def played(lights: OpenScene) -> Iterator[dict[str, FloatArray]]:
     series: dict[str, list[FloatArray]] = {name: [] for name in names}
     try:
         arena.reset(starts)
-        for _ in range(lights.world.steps):
+        while arena.state.running.any():
             step = arena.step()
             for name in names:
                 values = getattr(step.quantities, name)[:, EGO]
                 series[name].append(np.where(step.drove[:, EGO], values, np.nan))
-            if not arena.state.running.any():
-                break
         series["outcome"] = [arena.state.outcome[:, EGO].copy()]
         yield {name: np.array(values) for name, values in series.items()}
     finally:

@@ -20,21 +20,9 @@ from gymnasium.utils.env_checker import check_env
 from pettingzoo.test import parallel_api_test, parallel_seed_test
 
 import harness
-from harness import (
-    Arena,
-    ArenaVecEnv,
-    DrivingEnv,
-    Outcome,
-    ParallelDrivingEnv,
-    Seat,
-    UsageError,
-    open_scene,
-    read_document,
-)
+from harness import DrivingEnv, Outcome, ParallelDrivingEnv, UsageError, make_vec, read_document
 from harness.config.persona import Persona
 from harness.drivers.policy_file import Policy, write_policy
-from harness.drivers.sumo import SumoDriver
-from harness.game.human_factors import HumanFactors
 from harness.game.observation_layout import LAYOUT
 from harness.road.scene.open_scene import OpenScene
 from harness.sumo.libsumo_simulation import LibsumoSimulation
@@ -299,12 +287,7 @@ def test_sb3__trains_with_an_eval_callback_in_the_same_process(opened: Open, kin
     from stable_baselines3.common.vec_env import DummyVecEnv
 
     if kind == "arena":
-        scene = open_scene(REPOSITORY / "networks/merge")
-        careful = read_document(REPOSITORY / "personas/careful.toml", Persona)
-        arena = Arena(scene, 4, [Seat(None, careful.payoff), Seat(SumoDriver())])
-        training = opened(
-            ArenaVecEnv, arena, 0, scene.start_distribution([HumanFactors(), HumanFactors()], [1.0, 1.0]), "test"
-        )
+        training = opened(make_vec, 4, other="sumo", interface="sb3")
     else:
         training = opened(DummyVecEnv, [lambda: Monitor(DrivingEnv())])
     evaluation = opened(Monitor, DrivingEnv(other="sumo"))
