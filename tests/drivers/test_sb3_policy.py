@@ -153,7 +153,7 @@ def test_saved__an_algorithm_that_is_not_supported_is_refused_by_what_the_file_h
 def save(name: str, policy: str, env: Any, folder: Path, steps: int = 0, **more: Any) -> Path:
     """A file of an algorithm, trained for some steps."""
     small = {"policy_kwargs": {"net_arch": [8], **more.pop("policy_kwargs", {})}}
-    if name in ("DQN", "QRDQN", *SHORT) and name not in ("PPO", "A2C"):
+    if name in ("DQN", "QRDQN", "SAC", "TD3", "DDPG", "TQC"):
         small |= {"buffer_size": 200, "learning_starts": 10_000}
     model = algorithm(name)(policy, env, device="cpu", seed=1, **small, **more)
     if steps:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import gc
-import shutil
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from pathlib import Path
 from types import BuiltinFunctionType
 from typing import Any
 from unittest.mock import patch
@@ -24,7 +22,7 @@ from harness.environments.arena import Arena, Seat
 from harness.game.initial_state import draw_initial_state
 from harness.game.outcome import Outcome
 from harness.game.seeding import generator_of
-from harness.road.scene.open_scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene
 from harness.sumo import background_traffic
 from harness.sumo.vehicle_reads import DIRECT
 from tests.support.repository import REPOSITORY
@@ -107,14 +105,6 @@ def counting(scene: OpenScene, games: int, sumo_drives: bool = False) -> Iterato
         counted.arena.close()
 
 
-def with_traffic(vehicles: str, empty: OpenScene, folder: Path) -> OpenScene:
-    """A scene with background traffic on the same network, so that the tiles are made once."""
-    shutil.copytree(empty.folder, folder)
-    routes = folder / empty.document.routes
-    routes.write_text(routes.read_text().replace("</routes>", vehicles + "</routes>"))
-    return open_scene(folder)
-
-
 def vans(first_m: float) -> str:
     """Vehicles on both lanes, one behind the other, from `first_m` on."""
     places = [(k, k % 2, first_m + 10.0 * k) for k in range(VEHICLES)]
@@ -125,9 +115,8 @@ def vans(first_m: float) -> str:
 def scenes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, OpenScene]:
     """A straight road: without background traffic, with traffic beside the players, and with traffic far ahead."""
     folder = tmp_path_factory.mktemp("scenes")
-    empty = build_scene(folder / "empty")
-    busy, far = (with_traffic(vans(each), empty, folder / f"{each:g}") for each in (NEAR_M, FAR_M))
-    return {"empty": empty, "busy": busy, "far": far}
+    others = {"empty": "", "busy": vans(NEAR_M), "far": vans(FAR_M)}
+    return {name: build_scene(folder / name, others=vehicles) for name, vehicles in others.items()}
 
 
 # --- calls into SUMO --------------------------------------------------------------------------------------------------
