@@ -24,8 +24,7 @@ from benchmarks.sides import LapTimer, OnProgress, Side, best_rate, raw_numbers,
 from harness.campaign.execution.worker_pool import cores
 from harness.config.training import Retraining, Training
 from harness.drivers.mixture import mixture_of
-from harness.drivers.policy_file import LearnedDriver
-from harness.drivers.policy_file import write_policy
+from harness.drivers.policy_file import LearnedDriver, write_policy
 from harness.environments.gymnasium_env import DrivingEnv
 from harness.environments.vector_env import ACTION_SPACE, OBSERVATION_SPACE
 from harness.game.arrays import FloatArray

@@ -22,8 +22,7 @@ from harness.assessment.rollout import SeatedArm, assess
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.mixture import mixture_of
-from harness.drivers.policy_file import LearnedDriver
-from harness.drivers.policy_file import read_policy
+from harness.drivers.policy_file import LearnedDriver, read_policy
 from harness.drivers.sumo import SumoDriver
 from harness.road.scene.open_scene import open_scene
 
