@@ -1,8 +1,9 @@
-"""Drivers that are Python programs, and whether a process runs."""
+"""Drivers that are Python programs, and the processes that run."""
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -32,13 +33,6 @@ def driver(
     return ProcessDriver(command, folder, car, units=units, deadline_s=deadline_s, start_deadline_s=20.0, **options)
 
 
-def is_running(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
-
-
 def started(tmp_path: Path, car: Car, change: str = "pass") -> tuple[ProcessDriver, int]:
     """A driver whose program runs, and the program's process id."""
     mine = driver(tmp_path, car, f'open("pid", "w").write(str(os.getpid())); {change}')
@@ -46,14 +40,36 @@ def started(tmp_path: Path, car: Car, change: str = "pass") -> tuple[ProcessDriv
     return mine, int((tmp_path / "pid").read_text())
 
 
+def is_running(pid: int) -> bool:
+    return any(pid == running for running, _, _ in _running())
+
+
 def children_of(parent: int) -> list[int]:
     """The processes that a process has started and that run."""
-    found = []
+    return [pid for pid, started_by, _ in _running() if started_by == parent]
+
+
+def in_session(leader: int) -> list[int]:
+    """The processes of a session that run."""
+    return [pid for pid, _, session in _running() if session == leader]
+
+
+def command_of(pid: int) -> bytes:
+    """The command line of a process; empty if it has ended."""
+    return _read(f"/proc/{pid}/cmdline")
+
+
+def _running() -> Iterator[tuple[int, int, int]]:
+    """Each process that has not ended, its parent and its session."""
     for folder in Path("/proc").iterdir():
-        try:
-            fields = (folder / "stat").read_text().rpartition(")")[2].split()
-        except OSError:
-            continue
-        if folder.name.isdigit() and int(fields[1]) == parent and fields[0] != "Z":
-            found.append(int(folder.name))
-    return found
+        if folder.name.isdigit() and (stat := _read(f"{folder}/stat")):
+            state, parent, _, session, *_ = stat.decode().rpartition(")")[2].split()
+            if state != "Z":
+                yield int(folder.name), int(parent), int(session)
+
+
+def _read(path: str) -> bytes:
+    try:
+        return Path(path).read_bytes()
+    except OSError:
+        return b""

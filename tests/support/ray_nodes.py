@@ -6,10 +6,9 @@ import os
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
-from tests.support.processes import children_of
+from tests.support.processes import children_of, command_of
 
 _QUICK = {"health_check_initial_delay_ms": 0, "health_check_period_ms": 500, "health_check_failure_threshold": 3}
 _SMALL = {"object_store_memory": 80_000_000, "include_dashboard": False}
@@ -40,7 +39,7 @@ def add_node(cluster: Any, **options: Any) -> Any:
 def busy_process(node: Any) -> int | None:
     """The process of a node that carries a stage out; None if there is none."""
     (raylet,) = node.all_processes["raylet"]
-    busy = [pid for pid in children_of(raylet.process.pid) if b"_carry_out" in _command(pid)]
+    busy = [pid for pid in children_of(raylet.process.pid) if b"_carry_out" in command_of(pid)]
     return busy[0] if busy else None
 
 
@@ -64,10 +63,3 @@ def _start(cluster: Any, **options: Any) -> Any:
             if "timed out during startup" not in str(error):
                 raise
     return cluster.add_node(**_SMALL, **options)
-
-
-def _command(pid: int) -> bytes:
-    try:
-        return Path(f"/proc/{pid}/cmdline").read_bytes()
-    except OSError:
-        return b""

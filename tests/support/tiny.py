@@ -8,25 +8,27 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from harness.campaign.storage.run_log import LOG
+from harness.cli.messages import INTERRUPTED
 from harness.config.training import Training
 from harness.errors import NOT_ACCEPTED
 from tests.support.forked_command import can_fork, run_forked
+from tests.support.processes import children_of, command_of, in_session
 from tests.support.repository import REPOSITORY
 from tests.support.shared import built_once
 
 MERGE = REPOSITORY / "networks" / "merge"
+POLICIES = REPOSITORY / "policies" / "merge"
 CAREFUL, SPEEDY, DISTRACTED = (REPOSITORY / "personas" / f"{name}.toml" for name in ("careful", "speedy", "distracted"))
 HARNESS = Path(sys.executable).with_name("harness")
 TABLES = ("episodes.csv", "summary.csv", "comparisons.csv")
 PATIENCE_S = 600.0  # a bound on waiting: on a busy machine a second of work takes many; only a hang takes this long
-ALL_TABLES = (*TABLES, "training.csv", "manoeuvres.csv")
 
 TRAINING: dict[str, Any] = {
     "steps": 2048,
@@ -135,38 +137,32 @@ def end(process: subprocess.Popen[str]) -> str:
             process.wait()
 
 
-def in_session(leader: int) -> list[int]:
-    """The processes of a session that are alive."""
-    return [pid for pid, fields in _processes() if int(fields[3]) == leader and fields[0] != "Z"]
-
-
 def workers_of(parent: int) -> list[int]:
     """The workers that a command has started."""
-    children = [pid for pid, fields in _processes() if int(fields[1]) == parent and fields[0] != "Z"]
-    return [pid for pid in children if b"worker_pool" in _read(f"/proc/{pid}/cmdline")]
+    return [pid for pid in children_of(parent) if b"worker_pool" in command_of(pid)]
 
 
-def _processes() -> Iterable[tuple[int, list[str]]]:
-    """Each process with the fields of its stat after its name: state, parent, group, session."""
-    for folder in Path("/proc").iterdir():
-        if folder.name.isdigit() and (stat := _read(f"{folder}/stat")):
-            yield int(folder.name), stat.decode().rpartition(")")[2].split()
-
-
-def _read(path: str) -> bytes:
-    try:
-        return Path(path).read_bytes()
-    except OSError:
-        return b""
-
-
-def wait_for(condition: Callable[[], object], what: str, seconds: float = PATIENCE_S) -> None:
+def wait_for(condition: Callable[[], object], what: str) -> None:
     """Wait until the condition holds; fails, naming it, if it does not in time."""
-    until = time.monotonic() + seconds
+    until = time.monotonic() + PATIENCE_S
     while not condition():
         if time.monotonic() > until:
-            pytest.fail(f"waited {seconds:g} s in vain for: {what}")
+            pytest.fail(f"waited {PATIENCE_S:g} s in vain for: {what}")
         time.sleep(0.02)
+
+
+def wait_until_nothing_is_left(process: subprocess.Popen[str]) -> None:
+    """Wait until no process of a command runs."""
+    wait_for(lambda: not in_session(process.pid), "no process of it is left")
+
+
+def assert_interrupted(process: subprocess.Popen[str], code: int) -> None:
+    """The command ends with this exit code and one message, and leaves no process."""
+    printed = process.communicate(timeout=PATIENCE_S)[0]
+    assert process.returncode == code, printed
+    assert printed.splitlines()[-1] == INTERRUPTED
+    assert "Traceback" not in printed
+    wait_until_nothing_is_left(process)
 
 
 def tables(run: Path) -> dict[str, bytes]:
@@ -181,26 +177,32 @@ def files_in(run: Path) -> dict[str, bytes]:
 
 
 def numbers(run: Path) -> dict[str, bytes]:
-    """The bytes of all that a run's numbers are in."""
-    found = {name: (run / name).read_bytes() for name in ALL_TABLES}
-    for folder in ("policies", "traces"):
-        for file in (run / folder).rglob("*"):
-            if file.is_file():
-                found[file.relative_to(run).as_posix()] = file.read_bytes()
-    return found
+    """The bytes of all that a run's numbers are in: its tables, policies and traces."""
+    return {
+        name: content
+        for name, content in files_in(run).items()
+        if name.startswith(("policies/", "traces/")) or ("/" not in name and name.endswith(".csv"))
+    }
+
+
+def carried_out(campaign: Path, run: Path, *options: object, **settings: Any) -> str:
+    """Carry a campaign out by the real command, which must succeed; what it printed. It has one worker unless the
+    options say otherwise: each loads PyTorch, and tests run in as many processes as there are cores."""
+    jobs = () if "--jobs" in options else ("--jobs", 1)
+    done = harness("campaign", campaign, "--out", run, *jobs, *options, **settings)
+    assert done.returncode in (0, NOT_ACCEPTED), done.stdout + done.stderr
+    return done.stdout
 
 
 def finished(*options: object, **changes: Any) -> Path:
     """The run folder of a finished campaign, beside its document and `printed`, what the command printed. Built once
-    for the whole test session, by the campaign's name: tests read it, and none may change it. It has one worker unless
-    the options say otherwise: each loads PyTorch, and tests run in as many processes as there are cores."""
-    name, jobs = changes["name"], () if "--jobs" in options else ("--jobs", 1)
+    for the whole test session, by the campaign's name: tests read it, and none may change it."""
+    name = changes["name"]
 
     def build(folder: Path) -> None:
         campaign = write_campaign(folder, **changes)
-        done = harness("campaign", campaign, "--out", campaign.with_suffix(""), *jobs, *options)
-        assert done.returncode in (0, NOT_ACCEPTED), done.stdout + done.stderr
-        (folder / "printed").write_text(done.stdout, encoding="utf-8")
+        printed = carried_out(campaign, campaign.with_suffix(""), *options)
+        (folder / "printed").write_text(printed, encoding="utf-8")
 
     return built_once(name, build) / name
 
@@ -212,7 +214,12 @@ def learned_run() -> Path:
 
 def sumo_run() -> Path:
     """The run folder of a finished campaign whose ego SUMO drives."""
-    return finished("--jobs", 1, **BY_SUMO)
+    return finished(**BY_SUMO)
+
+
+def untrained_run() -> Path:
+    """The run folder of a finished campaign of a person that was trained before and an ego that SUMO drives."""
+    return finished(**UNTRAINED)
 
 
 BY_SUMO: dict[str, Any] = {
@@ -220,3 +227,5 @@ BY_SUMO: dict[str, Any] = {
     "ego": {"driver": "sumo", "persona": str(CAREFUL)},
     "assessment": {"episodes": 2},
 }
+UNTRAINED: dict[str, Any] = {**BY_SUMO, "name": "untrained", "training": None, "policies": str(POLICIES)}
+"""Nothing is trained: workers do not load PyTorch, and the command takes half of the time."""
