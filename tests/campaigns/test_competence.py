@@ -12,7 +12,8 @@ from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.research_questions import INCOMPETENT
 from harness.evaluation.tables import read_csv
 from tests.support.pages import Page
-from tests.support.tiny import finished, harness
+from tests.support.shared import built_once
+from tests.support.tiny import carried_out, learned_run, write_campaign
 
 pytestmark = pytest.mark.slow
 
@@ -21,35 +22,35 @@ LABEL = "not answered: the person can't drive this scene"
 
 @pytest.fixture(scope="session")
 def run() -> Path:
-    return finished(name="unlearned", competence=None)  # the table is left out: its defaults hold
+    """A finished campaign judged by the default bounds: they are no input of a training or an arm, and nothing is
+    played again but the person's games alone, which are removed."""
+
+    def build(folder: Path) -> None:
+        campaign = write_campaign(folder, name="learned", competence=None)  # the table is left out: its defaults hold
+        run = shutil.copytree(learned_run(), folder / "learned")
+        shutil.rmtree(run / ".stages" / "speedy_alone-seed1")
+        (folder / "printed").write_text(carried_out(campaign, run), encoding="utf-8")
+
+    return built_once("unlearned", build) / "learned"
 
 
-def printed(run: Path) -> str:
-    """What the command printed, without its line breaks."""
-    return " ".join((run.parent / "printed").read_text(encoding="utf-8").split())
-
-
-def test_terminal__names_each_training_that_did_not_learn(run: Path) -> None:
-    text = printed(run)
+def test_terminal__names_each_training_that_did_not_learn_and_answers_no_question(run: Path) -> None:
+    printed = (run.parent / "printed").read_text(encoding="utf-8")
+    started = [line.split()[1] for line in printed.splitlines() if line.startswith("started")]
+    assert started == ["speedy_alone-seed1"]
+    text = " ".join(printed.split())
     assert "did not learn: speedy-seed1: alone it reaches its goal in" in text  # as soon as its arm was played
     assert "Did not learn: speedy-seed1: alone it reaches its goal in" in text  # and at the end
-    assert "converged" not in text
-
-
-def test_terminal__no_question_is_answered(run: Path) -> None:
-    text = printed(run)
     for question in ("RQ1", "RQ2"):
         assert f"speedy, {question}: {LABEL}" in text
-    assert "significant" not in text
-    assert "p = " not in text
+    assert [word for word in ("converged", "significant", "p = ") if word in text] == []
 
 
 def test_comparisons__have_a_reason_and_no_test(run: Path) -> None:
     table = read_csv(run / "comparisons.csv")
     assert len(table) == 4
     assert set(table["verdict"]) <= {verdict.value for verdict in INCOMPETENT}
-    assert table["p_value"].isna().all()
-    assert table["p_holm"].isna().all()
+    assert table[["p_value", "p_holm"]].isna().all(axis=None)
     assert not table["rejects_h0"].any()
     assert table["reason"].str.contains("below 80 %", regex=False).all()
 
@@ -71,34 +72,20 @@ def test_manifest__and_curves_end_with_the_judgement(run: Path) -> None:
 def test_report__says_it_on_its_first_lines_and_on_each_card(run: Path) -> None:
     page = Page((run / "report.html").read_text(encoding="utf-8"))
     assert "did not learn to drive this scene." in page.text.partition("Watch")[0]  # before the links to the sections
-    assert f"RQ1: {LABEL}" in page.text
-    assert f"RQ2: {LABEL}" in page.text
+    assert all(f"{question}: {LABEL}" in page.text for question in ("RQ1", "RQ2"))
     assert "early: converged" not in page.text
 
 
-def test_command__again_has_nothing_to_do_and_says_the_same(run: Path, tmp_path: Path) -> None:
-    again = shutil.copytree(run, tmp_path / "again")
+def test_command__again_says_the_same_and_lower_bounds_play_nothing_and_answer(run: Path, tmp_path: Path) -> None:
+    again = shutil.copytree(run, tmp_path / "learned")
     before = (again / "manifest.json").read_bytes()
-    command = harness("campaign", run.with_suffix(".toml"), "--out", again, "--jobs", 1)
-    assert command.returncode == 0, command.stdout + command.stderr
-    text = " ".join(command.stdout.split())
+    text = " ".join(carried_out(run.with_suffix(".toml"), again).split())
     assert text.startswith("Nothing to do")
     assert "Did not learn: speedy-seed1: alone it reaches its goal in" in text
     assert f"speedy, RQ1: {LABEL}" in text
     assert (again / "manifest.json").read_bytes() == before
 
-
-def test_command__lower_bounds_play_nothing_again_and_answer(run: Path, tmp_path: Path) -> None:
-    """The bounds judge what was played: they are no input of a training or an arm."""
-    shutil.copytree(run.parent, tmp_path / "again")
-    again = tmp_path / "again" / run.name
-    document = again.with_suffix(".toml")
-    bounds = "[competence]\nego_goal_share = 0.0\nnon_ego_goal_share = 0.0\n"
-    document.write_text(document.read_text(encoding="utf-8") + bounds, encoding="utf-8")
-    command = harness("campaign", document, "--out", again, "--jobs", 1)
-    assert command.returncode == 0, command.stdout + command.stderr
-    assert "started" not in command.stdout
-    assert "not answered" not in command.stdout
-    assert "learn" not in command.stdout.replace("unlearned", "")
+    text = carried_out(learned_run().with_suffix(".toml"), again)
+    assert [word for word in ("started", "not answered", "not learn") if word in text] == []
     stages = json.loads((again / "manifest.json").read_text(encoding="utf-8"))["stages"]
     assert stages["speedy-seed1"]["stopped"] == "budget"

@@ -19,11 +19,10 @@ from tests.support.tiny import (
     SPEEDY,
     TRAINING,
     begin,
+    carried_out,
     end,
-    harness,
-    in_session,
     numbers,
-    wait_for,
+    wait_until_nothing_is_left,
     workers_of,
     write_campaign,
 )
@@ -59,15 +58,13 @@ def test_campaign__killed_at_25_random_moments_is_uninterrupted(tmp_path: Path) 
     build_scene(tmp_path / "scene", goal_m=80.0)
     campaign = write_campaign(tmp_path, **CAMPAIGN)
     began = time.monotonic()
-    whole = harness("campaign", campaign, "--out", tmp_path / "whole", "--jobs", 2)
+    carried_out(campaign, tmp_path / "whole", "--jobs", 2)
     lasts_s = time.monotonic() - began
-    assert whole.returncode == 0, whole.stdout + whole.stderr
     expected = numbers(tmp_path / "whole")
 
-    chance, run, kills, finished = random.Random(25), tmp_path / "run", 0, 0
-    command = ("campaign", campaign, "--out", run, "--jobs", 2)
+    chance, run, kills = random.Random(25), tmp_path / "run", 0
     while kills < KILLS:
-        process = begin(*command)
+        process = begin("campaign", campaign, "--out", run, "--jobs", 2)
         ended = False
         while not ended:
             until = time.monotonic() + chance.uniform(0.0, 0.3 * lasts_s)
@@ -81,13 +78,11 @@ def test_campaign__killed_at_25_random_moments_is_uninterrupted(tmp_path: Path) 
         printed = end(process)
         assert "Traceback" not in printed, printed
         assert process.returncode in (0, -signal.SIGKILL), printed
-        wait_for(lambda leader=process.pid: not in_session(leader), "no process of it is left")
+        wait_until_nothing_is_left(process)
         if process.returncode == 0:
             assert numbers(run) == expected
             shutil.rmtree(run)
-            finished += 1
-    last = harness(*command)
-    assert last.returncode == 0, last.stdout + last.stderr
+    carried_out(campaign, run, "--jobs", 2)
     assert numbers(run) == expected
     assert not list(run.rglob(".*.part"))
     beside_stages = {each.name for each in (run / ".stages").iterdir() if "-seed" not in each.name}

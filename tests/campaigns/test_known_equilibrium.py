@@ -51,11 +51,9 @@ from harness.game.observation_layout import LAYOUT, SIZE
 from harness.game.roles import EGO, ROLES
 from harness.game.seeding import parts_of
 from harness.road.scene.open_scene import OpenScene, open_scene
-from harness.training.ppo import train
-from harness.training.training_games import LearningPlace, TrainingSpec
 from tests.support.scenes import build_scene
 from tests.support.shared import built_once
-from tests.support.tiny import finished, settings
+from tests.support.tiny import finished
 
 STEPS, STEP_S, PEDALS_MPS2 = 15, 0.2, 1.1
 LENGTH_M, BESIDE_M, FAR_M = 2.5, 1.4, 10.0
@@ -125,10 +123,8 @@ TRAINING: dict[str, Any] = {
 def by_hand(ahead_m: Any, faster_mps: Any, ego: Any, non_ego: Any) -> FloatArray:
     """[...] the payoff of a player of weight 1, which is the same for both: how far ahead and how much faster the ego
     starts, [...], and both players' pedals, a number or one for each step [..., T]."""
-    pedals = np.broadcast_to(ego, (*np.shape(ego)[:-1], STEPS)) - np.broadcast_to(
-        non_ego, (*np.shape(non_ego)[:-1], STEPS)
-    )
-    faster = np.expand_dims(faster_mps, -1) + PEDALS_MPS2 * STEP_S * np.cumsum(pedals, -1)
+    own, other = (np.broadcast_to(each, (*np.shape(each)[:-1], STEPS)) for each in (ego, non_ego))
+    faster = np.expand_dims(faster_mps, -1) + PEDALS_MPS2 * STEP_S * np.cumsum(own - other, -1)
     ahead = np.expand_dims(ahead_m, -1) + STEP_S * np.cumsum(faster, -1)
     clearance = np.hypot(BESIDE_M, np.maximum(np.abs(ahead) - LENGTH_M, 0.0))
     assert clearance.max() < FAR_M  # or it would not be concave
@@ -263,12 +259,11 @@ def matrix(folder: Path, scene: OpenScene) -> Matrix:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("role", ROLES)
-@pytest.mark.parametrize("arm", CELLS)
-def test_matrix__each_game_pays_what_the_formula_says(arm: str, role: str, matrix: Matrix) -> None:
-    np.testing.assert_allclose(
-        matrix.payoffs(arm, role), WEIGHTS[role] * matrix.by_hand(*CELLS[arm]), rtol=1e-9, err_msg=f"{arm}, {role}"
-    )
+def test_matrix__each_game_pays_what_the_formula_says(matrix: Matrix) -> None:
+    for arm, pedals in CELLS.items():
+        for role in ROLES:
+            expected = WEIGHTS[role] * matrix.by_hand(*pedals)
+            np.testing.assert_allclose(matrix.payoffs(arm, role), expected, rtol=1e-9, err_msg=f"{arm}, {role}")
 
 
 @pytest.mark.slow
@@ -350,7 +345,6 @@ class Coin:
 
     scene: OpenScene
     personas: tuple[Persona, Persona]
-    folder: Path
 
     @property
     def player(self) -> Mixture:
@@ -361,24 +355,6 @@ class Coin:
         played = assess(SeatedArm(name=arm, scene=self.scene, drivers=(ego, self.player), seed=1), episodes)
         rows = pd.DataFrame([{"arm": arm, "persona": "blind", "seed": 1, **game.record} for game in played])
         return table_of("episodes", rows.to_dict("records"))
-
-    def best_response(self, initial: Policy | None) -> LearnedDriver:
-        how, named = settings(**TRAINING), ("coin", 1)
-        spec = TrainingSpec(
-            scene=self.scene,
-            persona=self.personas[EGO],
-            places=(LearningPlace(player=EGO, drivers=(None, self.player)),),
-            alone_share=0.0,
-            attentive_share=0.0,
-            initial=initial,
-            settings=how,
-            parts=named,
-            as_it_drives=True,
-        )
-        name = self.personas[EGO].name
-        return LearnedDriver(
-            train(spec, checkpoint=self.folder / f"{name}.safetensors", key=name, card={}).policy, False
-        )
 
     def gap(self, response: Driver) -> pd.Series:
         asked = Response(
@@ -396,26 +372,21 @@ class Coin:
         (row,) = gaps([asked], episodes, 0.01).iloc
         return row
 
-    def by_hand(self, relative: Any = None, absolute: Any = None) -> FloatArray:
-        """[E] what both earn in each episode as their coins fell. The ego's pedals may be others than its coin's, a
-        number or one for each step: `relative` is multiplied by the other player's, `absolute` is not."""
-        human_factors = [each.human_factors for each in self.personas]
-        start_distribution = self.scene.start_distribution(
-            [[each] * 2 for each in human_factors], [1.0, 1.0], [[1.0, 1.0]] * 2
-        )
-        fell = [draw_initial_state(start_distribution, *parts_of(1, episode)).member for episode in range(40)]
-        ego, other = np.array([FAST, SLOW])[np.array(fell)].T[:, :, None]
-        ahead, faster = starts_of(self.scene, range(40))
-        if relative is not None:
-            ego = relative * other
-        if absolute is not None:
-            ego = absolute + 0.0 * other
-        return by_hand(ahead, faster, ego, other)
+    def fell(self) -> FloatArray:
+        """[2, E, 1] the pedals of both players in each episode, as their coins fell."""
+        human_factors = [[each.human_factors] * 2 for each in self.personas]
+        starts = self.scene.start_distribution(human_factors, [1.0, 1.0], [[1.0, 1.0]] * 2)
+        members = [draw_initial_state(starts, *parts_of(1, episode)).member for episode in range(40)]
+        return np.array([FAST, SLOW])[np.array(members)].T[:, :, None]
+
+    def by_hand(self, ego: FloatArray) -> FloatArray:
+        """[E] what both earn in each episode with these pedals of the ego."""
+        return by_hand(*starts_of(self.scene, range(40)), ego, self.fell()[1])
 
 
-def coin_of(name: str, folder: Path, scene: OpenScene, scratch: Path) -> Coin:
+def coin_of(name: str, folder: Path, scene: OpenScene) -> Coin:
     ego, other = (read_document(folder / f"{each}.toml", Persona) for each in (name, "blind"))
-    return Coin(scene, (ego, other), scratch)
+    return Coin(scene, (ego, other))
 
 
 class Opposite:
@@ -439,32 +410,20 @@ class Opposite:
 
 
 @pytest.mark.parametrize("pedals", [FAST, SLOW])
-def test_coin__who_does_not_look_gains_nothing(pedals: float, folder: Path, scene: OpenScene, tmp_path: Path) -> None:
+def test_coin__who_does_not_look_gains_nothing(pedals: float, folder: Path, scene: OpenScene) -> None:
     """The pair is the mixed equilibrium: either end wins where the coin fell ill, and loses where it fell well."""
-    coin = coin_of("blind", folder, scene, tmp_path)
-    row = coin.gap(LearnedDriver(always(pedals), False))
-    assert row["payoff"] == pytest.approx(coin.by_hand().mean())
-    assert row["gap"] == pytest.approx((coin.by_hand(absolute=pedals) - coin.by_hand()).mean())
+    coin = coin_of("blind", folder, scene)
+    row, fell = coin.gap(LearnedDriver(always(pedals), False)), coin.fell()[0]
+    assert row["payoff"] == pytest.approx(coin.by_hand(fell).mean())
+    assert row["gap"] == pytest.approx((coin.by_hand(np.full_like(fell, pedals)) - coin.by_hand(fell)).mean())
     assert row["ci_low"] < 0.0 < row["ci_high"]
     assert GapVerdict(row["verdict"]) in NOTHING_TO_GAIN
 
 
-def test_coin__who_looks_gains_what_the_formula_says(folder: Path, scene: OpenScene, tmp_path: Path) -> None:
-    coin = coin_of("seeing", folder, scene, tmp_path)
-    row = coin.gap(Opposite(scene))
-    gained = coin.by_hand(relative=np.array([0.0] + [-1.0] * (STEPS - 1))) - coin.by_hand()
+def test_coin__who_looks_gains_what_the_formula_says(folder: Path, scene: OpenScene) -> None:
+    coin = coin_of("seeing", folder, scene)
+    row, (ego, other) = coin.gap(Opposite(scene)), coin.fell()
+    gained = coin.by_hand(np.array([0.0] + [-1.0] * (STEPS - 1)) * other) - coin.by_hand(ego)
     assert row["gap"] == pytest.approx(gained.mean())
     assert GapVerdict(row["verdict"]) == GapVerdict.DISTINGUISHABLE
     assert row["ci_low"] < gained.mean() < row["ci_high"]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["blind", "seeing"])
-def test_coin__what_is_learned_gains_no_more_than_there_is(
-    name: str, folder: Path, scene: OpenScene, tmp_path: Path
-) -> None:
-    """Nothing is asked of how well it was learned: that differs between processors."""
-    coin = coin_of(name, folder, scene, tmp_path)
-    row = coin.gap(coin.best_response(always(SLOW) if name == "blind" else None))
-    best = [coin.by_hand(absolute=FAST), coin.by_hand(absolute=SLOW)] if name == "blind" else [coin.by_hand(-1.0)]
-    assert row["gap"] <= max((each - coin.by_hand()).mean() for each in best) + 1e-9

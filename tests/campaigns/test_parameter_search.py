@@ -8,58 +8,51 @@ import os
 import re
 import shutil
 import signal
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 import pytest
 
-from harness.campaign.execution.cache_keys import stage_keys
 from harness.campaign.plan.paper_rounds import questions
-from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage, Reconfigured, SearchStage, TrainingStage
-from harness.campaign.preflight import QUICK_TRIALS, open_campaign
+from harness.campaign.preflight import open_campaign
 from harness.config.driver import read_driver
 from harness.evaluation.tables import read_csv
 from harness.training.parameter_search import read_trials
 from tests.support.external_drivers import document, find, problems
+from tests.support.plans import planned
 from tests.support.repository import REPOSITORY
-from tests.support.shared import built_once
-from tests.support.tiny import ALL_TABLES, CAREFUL, SPEEDY, begin, end, harness, wait_for, write_campaign
+from tests.support.tiny import (
+    CAREFUL,
+    POLICIES,
+    SPEEDY,
+    begin,
+    carried_out,
+    end,
+    finished,
+    harness,
+    numbers,
+    wait_for,
+    write_campaign,
+)
 
 ADAS = REPOSITORY / "egos" / "adas.toml"
-POLICIES = REPOSITORY / "policies" / "merge"
 SEARCH = {"trials": 8, "games": 16, "games_at_once": 8}
 STAGE = "reconfigured_speedy-seed1"
 
 
-def write(folder: Path, driver: object = ADAS, **changes: Any) -> Path:
+def searched(driver: object = ADAS, **changes: Any) -> dict[str, Any]:
     """A campaign that trains nothing, and plays nothing but what is asked for here."""
-    return write_campaign(
-        folder,
-        **{
-            "training": None,
-            "policies": str(POLICIES),
-            "ego": {"driver": str(driver), "persona": str(CAREFUL)},
-            "reconfiguration": SEARCH,
-            **changes,
-        },
-    )
-
-
-def planned(file: Path, **options: Any) -> tuple[dict[str, Any], dict[str, str]]:
-    campaign = open_campaign(file, **options)
-    stages = plan(campaign.document, [each.name for each in campaign.personas], campaign.tunable)
-    assert len({stage.id for stage in stages}) == len(stages)
-    return {stage.id: stage for stage in stages}, stage_keys(campaign, stages)
+    ego = {"driver": str(driver), "persona": str(CAREFUL)}
+    return {"training": None, "policies": str(POLICIES), "ego": ego, "reconfiguration": SEARCH, **changes}
 
 
 # --- the plan ---
 
 
 def test_plan__of_an_ego_with_something_to_tune(tmp_path: Path) -> None:
-    trained, _ = planned(write(tmp_path, seeds=[1, 7], policies=None))
+    trained, _ = planned(tmp_path, **searched(seeds=[1, 7], policies=None))
     assert {id for id, stage in trained.items() if isinstance(stage, TrainingStage)} == {"speedy-seed1", "speedy-seed7"}
     for seed in (1, 7):
         search = trained[f"reconfigured_speedy-seed{seed}"]
@@ -72,13 +65,13 @@ def test_plan__of_an_ego_with_something_to_tune(tmp_path: Path) -> None:
             assert stage.ego == (Reconfigured(stage=search.id),)
     assert not [id for id in trained if "retrained" in id]
 
-    before, _ = planned(write(tmp_path))
+    before, _ = planned(tmp_path, **searched())
     assert (before[STAGE].needs, before[STAGE].reads) == ((), ("speedy-seed1",))
     assert not [stage for stage in before.values() if isinstance(stage, TrainingStage)]
 
 
 def test_questions__compare_naive_with_reconfigured(tmp_path: Path) -> None:
-    campaign = open_campaign(write(tmp_path))
+    campaign = open_campaign(write_campaign(tmp_path, **searched()))
     asked = {each.question: (each.baseline, each.treatment) for each in questions(campaign.document, ["speedy"], True)}
     assert asked == {"RQ1": ("naive_alone", "naive_vs_speedy"), "RQ2": ("naive_vs_speedy", "reconfigured_vs_speedy")}
 
@@ -106,10 +99,10 @@ def test_keys__of_a_search_change_with_what_it_is_made_of_and_with_no_more(
 ) -> None:
     text = ADAS.read_text()
     driver = document(tmp_path, with_tunable(text, 0.8), "adas.toml")
-    stages, keys = planned(write(tmp_path, tmp_path / driver))
+    stages, keys = planned(tmp_path, **searched(tmp_path / driver))
     if tunable := change.pop("tunable", None):
         document(tmp_path, tunable(text), "adas.toml")
-    _, other = planned(write(tmp_path, tmp_path / driver, **change))
+    _, other = planned(tmp_path, **searched(tmp_path / driver, **change))
     changed = {name for name, key in keys.items() if key != other[name]}
     assert changed == ({*stages} - {STAGE} if redone is None else redone)
 
@@ -125,18 +118,14 @@ def test_keys__of_a_search_change_with_what_it_is_made_of_and_with_no_more(
         ({"driver": REPOSITORY / "egos" / "rss.toml"}, "reconfiguration: this ego has nothing to tune"),
         ({"policies": None, "retraining": {"alone_share": 0.5}}, "retraining: this ego is not trained"),
         ({"reconfiguration": {"trials": 1}}, "reconfiguration.trials: 1 is not possible"),
-        ({"reconfiguration": {"trials": 2.5}}, "reconfiguration.trials: 2.5 is not possible"),
-        ({"reconfiguration": {"games": 0}}, "reconfiguration.games: 0 is not possible"),
-        ({"reconfiguration": {"games_at_once": 1025}}, "reconfiguration.games_at_once: 1025 is not possible"),
-        ({"reconfiguration": {"alone_share": 1.5}}, "reconfiguration.alone_share: 1.5 is not possible"),
         ({"reconfiguration": {"trails": 5}}, "reconfiguration.trails: unknown key (did you mean 'trials'?)"),
         ({"reconfiguration": "long"}, "reconfiguration: 'long' is not possible"),
     ],
-)  # fmt: skip
+)
 def test_check__a_table_that_would_be_ignored_or_can_not_be_is_an_error(
     changes: dict[str, Any], said: str, tmp_path: Path
 ) -> None:
-    found = problems(write(tmp_path, **changes))
+    found = problems(write_campaign(tmp_path, **searched(**changes)))
     assert [each for each in found if said in each], found
 
 
@@ -144,51 +133,23 @@ def test_check__a_persona_may_not_be_called_as_a_search_is(tmp_path: Path) -> No
     text = SPEEDY.read_text()
     names = ("anna", "reconfigured_anna")
     files = [document(tmp_path, text.replace('name = "speedy"', f'name = "{name}"'), f"{name}.toml") for name in names]
-    (said,) = problems(write(tmp_path, policies=None, personas=files))
+    (said,) = problems(write_campaign(tmp_path, **searched(policies=None, personas=files)))
     assert "two stages would be called 'reconfigured_anna-seed1'" in said
 
 
 def test_check__says_what_will_be_searched(tmp_path: Path) -> None:
-    told = harness("check", write(tmp_path)).stdout
+    told = harness("check", write_campaign(tmp_path, **searched())).stdout
     assert "Round 2 searches its parameters in 8 trials of 16 games: cruise.speed_share from 0.7 to 1, " in told
     assert f"  tune   {STAGE}  with speedy-seed1" in told
     assert "nothing is trained, 6 arms of 4 episodes" in told
 
 
-def test_quick__searches_less(tmp_path: Path) -> None:
-    many = write(tmp_path, reconfiguration={"trials": 500})
-    assert open_campaign(many).document.reconfiguration.trials == 500
-    quick = open_campaign(many, quick=True)
-    assert quick.quick
-    assert quick.document.reconfiguration.trials == QUICK_TRIALS
-
-
 # --- whole campaigns (each a start of a program that takes seconds to start) ---
 
 
-@pytest.fixture(scope="module")
-def campaign() -> Path:
-    """A campaign that has been run into the folder `run` beside it."""
-
-    def build(folder: Path) -> None:
-        file = write(folder)
-        done = harness("campaign", file, "--out", folder / "run", "--jobs", 1)
-        assert done.returncode == 0, done.stdout + done.stderr
-        (folder / "printed").write_text(done.stdout)
-
-    return built_once("reconfigured", build) / "tiny.toml"
-
-
 @pytest.fixture
-def run(campaign: Path) -> Path:
-    return campaign.parent / "run"
-
-
-def numbers(run: Path) -> dict[str, bytes]:
-    """The bytes of all that a run's numbers are in."""
-    files = [run / name for name in (*ALL_TABLES, "reconfiguration.csv")]
-    files += [file for folder in ("policies", "traces") for file in (run / folder).rglob("*") if file.is_file()]
-    return {file.relative_to(run).as_posix(): file.read_bytes() for file in files}
+def run() -> Path:
+    return finished(**searched(name="reconfigured"))
 
 
 @pytest.mark.slow
@@ -217,6 +178,8 @@ def test_campaign__naive_and_reconfigured_are_compared_as_naive_and_retrained_ar
         *("naive_alone", "naive_vs_sumo", "speedy_alone", "naive_vs_speedy"),
         *("reconfigured_vs_speedy", "reconfigured_alone_speedy"),
     }
+    versions = json.loads((run / "manifest.json").read_text())["stages"][STAGE]["versions"]
+    assert [set(each) > {"optuna", "libsumo"} for each in versions] == [True]
     (row,) = comparisons.query("question == 'RQ2' and metric == 'mean_speed'").to_dict("records")
     speeds = {arm: games.set_index("episode")["ego_mean_speed_mps"] for arm, games in episodes.groupby("arm")}
     assert row["mean_difference"] == pytest.approx(
@@ -225,7 +188,7 @@ def test_campaign__naive_and_reconfigured_are_compared_as_naive_and_retrained_ar
 
 
 @pytest.mark.slow
-def test_campaign__the_report_and_the_terminal_say_reconfigured(campaign: Path, run: Path) -> None:
+def test_campaign__the_report_and_the_terminal_say_reconfigured(run: Path) -> None:
     page = html.unescape((run / "report.html").read_text())
     assert "Did reconfiguration fix it?" in page
     assert "reconfigured ego, against speedy" in page
@@ -238,26 +201,19 @@ def test_campaign__the_report_and_the_terminal_say_reconfigured(campaign: Path, 
     assert 'id="reconfiguration"' in page
     words = re.sub(r"<[^>]*>", "", re.sub(r"<(script|style)>.*?</\1>", "", page, flags=re.DOTALL))
     assert all("retrained or reconfigured" in line for line in words.splitlines() if "retrain" in line.lower())
-    printed = (campaign.parent / "printed").read_text()
+    printed = (run.parent / "printed").read_text()
+    assert "mixes versions" not in printed
     assert "8 trials in" in printed
     assert "speedy, RQ2: " in printed
     assert "reconfigured ego" in printed or "Reconfiguration" in printed
 
 
 @pytest.mark.slow
-def test_campaign__it_is_not_said_to_mix_versions(campaign: Path, run: Path) -> None:
-    assert "mixes versions" not in (campaign.parent / "printed").read_text()
-    versions = json.loads((run / "manifest.json").read_text())["stages"][STAGE]["versions"]
-    assert [set(each) > {"optuna", "libsumo"} for each in versions] == [True]
-
-
-@pytest.mark.slow
 def test_campaign__the_driver_that_was_found_is_an_ego_that_plays_the_same_games(run: Path, tmp_path: Path) -> None:
     found = run / "policies" / STAGE / "driver.toml"
     assert found.read_text().startswith("# the rules adas (")
-    file = write(tmp_path, document(tmp_path, found.read_text() + "\n[tunable]\n"), reconfiguration=None)
-    done = harness("campaign", file, "--out", tmp_path / "run", "--jobs", 1)
-    assert done.returncode == 0, done.stdout + done.stderr
+    driver = document(tmp_path, found.read_text() + "\n[tunable]\n")
+    carried_out(write_campaign(tmp_path, **searched(driver, reconfiguration=None)), tmp_path / "run")
     theirs, ours = read_csv(run / "episodes.csv"), read_csv(tmp_path / "run" / "episodes.csv")
     for now, then in (("naive_vs_speedy", "reconfigured_vs_speedy"), ("naive_alone", "reconfigured_alone_speedy")):
         both = ours[ours["arm"] == now], theirs[theirs["arm"] == then]
@@ -274,43 +230,29 @@ def trials_of(run: Path) -> int:
 
 
 @pytest.mark.slow
-def test_campaign__killed_in_its_search_goes_on_and_ends_the_same(campaign: Path, run: Path, tmp_path: Path) -> None:
-    again = tmp_path / "run"
+def test_campaign__killed_in_its_search_goes_on_and_ends_the_same(run: Path, tmp_path: Path) -> None:
+    campaign, again = run.with_suffix(".toml"), tmp_path / "run"
     for signal_number, trials in ((signal.SIGKILL, 2), (signal.SIGINT, 5)):
         process = begin("campaign", campaign, "--out", again, "--jobs", 1)
         wait_for(lambda trials=trials: trials_of(again) >= trials, f"{trials} trials are kept")  # type: ignore[misc]
         os.kill(process.pid, signal_number)
         end(process)
         assert trials <= trials_of(again) < 8
-    done = harness("campaign", campaign, "--out", again, "--jobs", 1)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert numbers(again) == numbers(run)
-    skipped = harness("campaign", campaign, "--out", again)
-    assert "started" not in skipped.stdout
+    carried_out(campaign, again)
     assert numbers(again) == numbers(run)
 
 
-@pytest.mark.parametrize(
-    ("damage", "redone"),
-    [
-        (lambda run: (run / "policies" / STAGE / "driver.toml").unlink(), STAGE),
-        (lambda run: (run / ".stages" / STAGE / "reconfiguration.csv").write_text("stage\n"), STAGE),
-    ],
-    ids=["driver", "table"],
-)
 @pytest.mark.slow
-def test_campaign__what_is_damaged_of_a_search_is_noticed_and_made_again(
-    damage: Callable[[Path], object], redone: str, campaign: Path, run: Path, tmp_path: Path
-) -> None:
-    again = tmp_path / "run"
-    shutil.copytree(run, again)
-    damage(again)
+def test_campaign__what_is_damaged_of_a_search_is_noticed_and_made_again(run: Path, tmp_path: Path) -> None:
+    again = shutil.copytree(run, tmp_path / "run")
+    damaged = [again / "policies" / STAGE / "driver.toml", again / ".stages" / STAGE / "reconfiguration.csv"]
+    damaged[0].unlink()
+    damaged[1].write_text("stage\n")
     refused = harness("report", again)
     assert refused.returncode == 2
-    assert "is missing, or is not what the campaign wrote" in refused.stderr
-    done = harness("campaign", campaign, "--out", again)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert f"started  {redone}" in done.stdout
+    for file in damaged:
+        assert f"{file}: is missing, or is not what the campaign wrote" in refused.stderr
+    assert f"started  {STAGE}" in carried_out(run.with_suffix(".toml"), again)
     assert numbers(again) == numbers(run)
 
 
@@ -323,12 +265,11 @@ def test_campaign__a_program_that_plays_one_game_at_a_time_is_searched_so(tmp_pa
     (tmp_path / "perl" / "drive.pl").write_text(alone)
     text = (tmp_path / "perl" / "perl.toml").read_text()
     (tmp_path / "perl" / "perl.toml").write_text(text + "[parameters]\na = 1.0\n[tunable]\na = [0.0, 2.0]\n")
-    (said,) = problems(write(tmp_path, "perl/perl.toml"))
+    (said,) = problems(write_campaign(tmp_path, **searched("perl/perl.toml")))
     assert "one at a time" in said
     search = {"trials": 2, "games": 2, "games_at_once": 1}
-    file = write(tmp_path, "perl/perl.toml", reconfiguration=search, assessment={"episodes": 2})
-    done = harness("campaign", file, "--out", tmp_path / "run", "--allow-code", "--jobs", 1)
-    assert done.returncode == 0, done.stdout + done.stderr
+    changes = searched("perl/perl.toml", reconfiguration=search, assessment={"episodes": 2})
+    carried_out(write_campaign(tmp_path, **changes), tmp_path / "run", "--allow-code")
     table = read_csv(tmp_path / "run" / "reconfiguration.csv")
     assert table["mean_payoff"].nunique() == 1  # it heeds no parameter:
     assert table["chosen"].tolist() == [True, False]  # then what was given stays

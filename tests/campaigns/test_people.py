@@ -11,7 +11,8 @@ import pytest
 from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import read_trace
 from tests.support.scenes import THREE_PEOPLE, build_scene
-from tests.support.tiny import SPEEDY, harness, write_campaign, write_persona
+from tests.support.shared import built_once
+from tests.support.tiny import SPEEDY, TRAINING, finished, harness, write_persona
 
 pytestmark = pytest.mark.slow
 
@@ -19,21 +20,22 @@ PEOPLE = ["non_ego", "non_ego_2", "non_ego_3"]
 MIXED: dict[str, Any] = {"name": "mixed", "personas": ["speedy", "anna", "speedy"]}
 
 
-@pytest.fixture(scope="module")
-def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("three")
+def three_people(folder: Path) -> None:
     build_scene(folder / "scene", places=THREE_PEOPLE)
-    personas = [str(SPEEDY), str(write_persona(folder, "anna"))]
-    return write_campaign(folder, scene="scene", personas=personas, crowd=[MIXED])
+    write_persona(folder, "anna")
 
 
 @pytest.fixture(scope="module")
-def run(campaign: Path) -> Path:
-    folder = campaign.with_name("run")
-    done = harness("campaign", campaign, "--out", folder)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "mixed, RQ2" in done.stdout
-    return folder
+def run() -> Path:
+    folder = built_once("three_people", three_people)
+    return finished(
+        "--quick",
+        name="people",
+        scene=str(folder / "scene"),
+        personas=[str(SPEEDY), str(folder / "anna.toml")],
+        training={**TRAINING, "steps": TRAINING["segment_steps"]},
+        crowd=[MIXED],
+    )
 
 
 def test_campaign__has_the_arms_of_the_crowd(run: Path) -> None:
@@ -47,8 +49,7 @@ def test_campaign__has_the_arms_of_the_crowd(run: Path) -> None:
 def test_campaign__all_people_take_part_beside_the_ego_and_one_at_a_time_without(run: Path) -> None:
     games = read_csv(run / "episodes.csv").set_index(["arm", "episode"])
     there = games[[f"{name}_outcome" for name in PEOPLE]] != ""
-    assert there.loc["naive_vs_mixed"].all(axis=None)
-    assert there.loc["naive_vs_sumo"].all(axis=None)
+    assert there.loc[["naive_vs_mixed", "naive_vs_sumo"]].all(axis=None)
     assert not there.loc["naive_alone"].any(axis=None)
     assert there.loc["speedy_alone"].to_numpy().tolist() == [
         [True, False, False],
@@ -70,8 +71,10 @@ def test_campaign__a_crowd_has_the_policies_of_its_personas(run: Path) -> None:
         assert found["mixed"] == found[persona] != found[other]
 
 
-def test_campaign__report_and_replays_name_the_people(run: Path) -> None:
+def test_campaign__terminal_report_and_replays_name_the_people(run: Path) -> None:
+    assert "mixed, RQ2" in (run.parent / "printed").read_text(encoding="utf-8")
     page = (run / "report.html").read_text(encoding="utf-8")
+    assert "not for conclusions" in page  # it is a quick run
     assert "the naive ego against the crowd mixed" in page
     assert "the non-ego mixed" not in page
     listed = harness("replay", run, "--list")
@@ -81,28 +84,11 @@ def test_campaign__report_and_replays_name_the_people(run: Path) -> None:
     assert all(f'id="{name}"' in (replay / "episode.fcd.xml").read_text(encoding="utf-8") for name in PEOPLE)
 
 
-def test_campaign__is_resumed_and_reported_again_to_the_same_bytes(campaign: Path, run: Path) -> None:
-    tables = {file.name: file.read_bytes() for file in run.glob("*.csv")}
-    for command in (("campaign", campaign, "--out", run), ("report", run)):
-        done = harness(*command)
-        assert done.returncode == 0, done.stdout + done.stderr
-        assert {file.name: file.read_bytes() for file in run.glob("*.csv")} == tables
-
-
-def test_check__lists_the_people_and_show_draws_them(campaign: Path) -> None:
-    scene = campaign.with_name("scene")
-    checked = harness("check", scene)
+def test_check__lists_the_people_and_show_draws_them(run: Path, tmp_path: Path) -> None:
+    checked = harness("check", run / "scene")
     assert checked.returncode == 0, checked.stderr
     assert [line.split(":")[0] for line in checked.stdout.splitlines() if ": vehicle" in line] == ["ego", *PEOPLE]
-    page = campaign.with_name("scene.html")
-    shown = harness("scene", "show", scene, "--html", page)
+    page = tmp_path / "scene.html"
+    shown = harness("scene", "show", run / "scene", "--html", page)
     assert shown.returncode == 0, shown.stderr
     assert all(f"route of {name}" in page.read_text(encoding="utf-8") for name in PEOPLE)
-
-
-def test_check__a_crowd_that_does_not_match_the_people_is_one_line_and_exit_2(campaign: Path) -> None:
-    file = campaign.with_name("other.toml")
-    file.write_text(campaign.read_text(encoding="utf-8").replace(', "anna", ', ", "), encoding="utf-8")
-    refused = harness("check", file)
-    assert refused.returncode == 2
-    assert "crowd[0].personas: 2 personas, and people of the scene: 3" in " ".join(refused.stderr.split())

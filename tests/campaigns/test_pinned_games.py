@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import subprocess
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -14,22 +13,17 @@ import pytest
 from harness.config.pinned_game import PinnedGame
 from harness.config.toml_reading import read_document
 from harness.evaluation.tables import read_csv
-from tests.support.tiny import finished, harness
+from tests.support.tiny import POLICIES, carried_out, finished, harness, numbers
 
 ARM = "naive_vs_speedy"
 
 
 @pytest.fixture(scope="module")
-def policies(repository: Path) -> Path:
-    return repository / "policies" / "merge"
-
-
-@pytest.fixture(scope="module")
-def run(policies: Path) -> Path:
+def run() -> Path:
     """A few games of the shipped policies, with the judgement of their failures."""
     changes: dict[str, Any] = {
         "name": "pinned",
-        "policies": str(policies),
+        "policies": str(POLICIES),
         "training": None,
         "assessment": {"episodes": 8, "reference_drivers": True},
     }
@@ -44,21 +38,13 @@ def failed(run: Path) -> list[int]:
 
 
 @pytest.fixture(scope="module")
-def pinned(run: Path, policies: Path, failed: list[int], tmp_path_factory: pytest.TempPathFactory) -> Path:
+def pinned(run: Path, failed: list[int], tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of one pinned game."""
     folder = tmp_path_factory.mktemp("pinned") / "games"
-    done = minimise(run, ARM, failed[0], "--policies", policies, "--out", folder)
+    done = harness("minimise", run, ARM, failed[0], "--policies", POLICIES, "--out", folder)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "no longer fails after this change" in done.stdout
     return folder
-
-
-def minimise(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return harness("minimise", *arguments)
-
-
-def regression(folder: Path, ego: Path, *options: object) -> subprocess.CompletedProcess[str]:
-    return harness("regression", folder, "--ego", ego, *options)
 
 
 def game_of(folder: Path) -> PinnedGame:
@@ -69,8 +55,8 @@ def game_of(folder: Path) -> PinnedGame:
 # --- the judgement of the same run ---
 
 
-def test_preventability__every_failure_is_judged_by_every_driver(run: Path, failed: list[int]) -> None:
-    games = read_csv(run / "reference_drivers.csv")
+def test_preventability__every_failure_is_judged_by_every_driver_and_counted(run: Path, failed: list[int]) -> None:
+    games, counts = read_csv(run / "reference_drivers.csv"), read_csv(run / "preventability.csv")
     of_arm = games[games["arm"] == ARM]
     assert sorted(of_arm["episode"].unique()) == sorted(failed)
     assert set(of_arm.groupby("driver").size()) == {len(failed)}
@@ -78,10 +64,6 @@ def test_preventability__every_failure_is_judged_by_every_driver(run: Path, fail
     assert (of_arm["conflict_s"].dropna() < of_arm["failed_s"].loc[of_arm["conflict_s"].notna()]).all()
     assert (of_arm["preventable_from_s"] <= of_arm["preventable_until_s"]).all()
     assert (of_arm["preventable_until_s"] < of_arm["failed_s"]).all()
-
-
-def test_preventability__the_counts_are_those_of_the_games(run: Path) -> None:
-    games, counts = read_csv(run / "reference_drivers.csv"), read_csv(run / "preventability.csv")
     prevented = games.groupby(["arm", "driver"])["prevented_from_start"].sum()
     for row in counts[counts["driver"] != "any"].itertuples():
         assert row.from_start_prevented == prevented[row.arm, row.driver]
@@ -89,16 +71,12 @@ def test_preventability__the_counts_are_those_of_the_games(run: Path) -> None:
 
 
 def test_preventability__running_the_campaign_again_judges_nothing_again(run: Path, tmp_path: Path) -> None:
-    again = tmp_path / "pinned"
-    shutil.copytree(run, again)
-    done = harness("campaign", run.with_suffix(".toml"), "--out", again)
-    assert "Nothing to do" in done.stdout
+    again, campaign = shutil.copytree(run, tmp_path / "pinned"), run.with_suffix(".toml")
+    assert "Nothing to do" in carried_out(campaign, again)
     (again / ".stages" / f"{ARM}_preventability-seed1" / "reference_drivers.csv").unlink()
-    done = harness("campaign", run.with_suffix(".toml"), "--out", again)
-    assert "done     naive_vs_speedy_preventability-seed1" in done.stdout
-    assert "done     naive_vs_speedy-seed1" not in done.stdout
-    for name in ("reference_drivers.csv", "preventability.csv"):
-        assert (again / name).read_bytes() == (run / name).read_bytes()
+    printed = carried_out(campaign, again)
+    assert [f"done     {ARM}{stage}-seed1" in printed for stage in ("_preventability", "")] == [True, False]
+    assert numbers(again) == numbers(run)
 
 
 # --- minimising ---
@@ -116,22 +94,23 @@ def test_minimise__the_start_lies_between_the_campaigns_and_one_without_a_failur
     ) != list(game.no_failure_from.speed_mps)
 
 
-def test_minimise__all_pins_one_game_of_each_kind(run: Path, policies: Path, failed: list[int], tmp_path: Path) -> None:
-    done = minimise(run, ARM, "--all", "--out", tmp_path)  # the shipped policies are found by their checksums
+def test_minimise__all_pins_one_game_of_each_kind(run: Path, failed: list[int], tmp_path: Path) -> None:
+    """The shipped policies are found by their checksums."""
+    done = harness("minimise", run, ARM, "--all", "--out", tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     games = [read_document(file, PinnedGame) for file in sorted(tmp_path.glob("*.toml"))]
     assert 1 <= len(games) <= len(failed)
     assert sum(game.alike for game in games) == len(failed)
 
 
-def test_minimise__says_what_is_wrong(run: Path, policies: Path, failed: list[int]) -> None:
+def test_minimise__says_what_is_wrong(run: Path, failed: list[int]) -> None:
     fine = next(episode for episode in range(8) if episode not in failed)
     for arguments, words in (
-        ((run, ARM, fine, "--policies", policies), "does not fail in this game"),
-        ((run, "naive_vs_nobody", 0, "--policies", policies), "has no such arm"),
+        ((run, ARM, fine, "--policies", POLICIES), "does not fail in this game"),
+        ((run, "naive_vs_nobody", 0, "--policies", POLICIES), "has no such arm"),
         ((run,), "names no game"),
     ):
-        done = minimise(*arguments)
+        done = harness("minimise", *arguments)
         assert done.returncode == 2
         assert words in done.stderr
 
@@ -139,33 +118,31 @@ def test_minimise__says_what_is_wrong(run: Path, policies: Path, failed: list[in
 # --- regression ---
 
 
-def test_regression__the_naive_ego_fails_and_the_retrained_ego_passes(
-    pinned: Path, policies: Path, tmp_path: Path
-) -> None:
-    naive = regression(pinned, policies / "naive-seed1", "--junit", tmp_path / "junit.xml")
+def test_regression__the_naive_ego_fails_and_the_retrained_ego_passes(pinned: Path, tmp_path: Path) -> None:
+    naive = harness("regression", pinned, "--ego", POLICIES / "naive-seed1", "--junit", tmp_path / "junit.xml")
     assert naive.returncode == 3, naive.stdout + naive.stderr
     assert "FAIL" in naive.stdout
     suite = ElementTree.parse(tmp_path / "junit.xml").getroot().find("testsuite")
     assert suite is not None
     assert (suite.get("tests"), suite.get("failures"), suite.get("errors")) == ("1", "1", "0")
-    retrained = regression(pinned, policies / "retrained_speedy-seed1")
+    retrained = harness("regression", pinned, "--ego", POLICIES / "retrained_speedy-seed1")
     assert retrained.returncode == 0, retrained.stdout + retrained.stderr
     assert "1 of 1 pinned games pass." in retrained.stdout
 
 
-def test_regression__refuses_what_is_not_the_pinned_game(pinned: Path, policies: Path, tmp_path: Path) -> None:
-    empty = regression(tmp_path, policies / "naive-seed1")
+def test_regression__refuses_what_is_not_the_pinned_game(pinned: Path, tmp_path: Path) -> None:
+    empty = harness("regression", tmp_path, "--ego", POLICIES / "naive-seed1")
     assert (empty.returncode, "no pinned game" in empty.stderr) == (2, True)
     changed = tmp_path / "changed"
     shutil.copytree(pinned, changed)
     for name in ("policy.json", "policy.safetensors"):
-        shutil.copy(policies / "naive-seed1" / name, changed / "policies" / "speedy-seed1" / name)
+        shutil.copy(POLICIES / "naive-seed1" / name, changed / "policies" / "speedy-seed1" / name)
     with (changed / "scene" / "scene.toml").open("a", encoding="utf-8") as scene:
         scene.write("\n# changed\n")
-    done = regression(changed, policies / "naive-seed1")
+    done = harness("regression", changed, "--ego", POLICIES / "naive-seed1")
     assert done.returncode == 2
     assert "is not the scene of this game" in done.stderr
     shutil.copytree(pinned / "scene", changed / "scene", dirs_exist_ok=True)
-    done = regression(changed, policies / "naive-seed1")
+    done = harness("regression", changed, "--ego", POLICIES / "naive-seed1")
     assert done.returncode == 2
     assert "is not the policy of this game" in done.stderr

@@ -17,16 +17,17 @@ from harness.campaign.execution.run_stages import MOST_CRASHES, run_stages
 from harness.campaign.execution.stage_run import Event, StageRun
 from harness.campaign.plan.stages import Stage
 from harness.campaign.storage.run_folder import RunFolder
-from harness.cli.messages import INTERRUPTED
 from tests.support.plans import empty_context, training_of
+from tests.support.processes import in_session
 from tests.support.ray_nodes import add_node, busy_process, cluster_of, pull_the_plug
 from tests.support.tiny import (
     BY_SUMO,
     PATIENCE_S,
+    assert_interrupted,
     begin,
+    carried_out,
     end,
     harness,
-    in_session,
     numbers,
     sumo_run,
     wait_for,
@@ -42,23 +43,21 @@ def cluster() -> Iterator[Any]:
         yield running
 
 
-def begin_campaign(tmp_path: Path, address: str) -> tuple[Any, Path, list[object]]:
+def begin_campaign(tmp_path: Path, address: str) -> tuple[Any, Path, Path]:
     """The campaign of `sumo_run`, begun on a cluster, one stage at a time; returned when its training has a segment."""
-    run = tmp_path / "run"
-    command: list[object] = ["campaign", write_campaign(tmp_path, **BY_SUMO), "--out", run]
-    command += ["--jobs", 1, "--ray", address]
-    process = begin(*command)
+    campaign, run = write_campaign(tmp_path, **BY_SUMO), tmp_path / "run"
+    process = begin("campaign", campaign, "--out", run, "--jobs", 1, "--ray", address)
     checkpoint = run / ".stages" / "speedy-seed1" / "checkpoint.safetensors"
     wait_for(lambda: checkpoint.exists() or process.poll() is not None, "the first segment")
     assert checkpoint.exists(), end(process)
-    return process, run, command
+    return process, campaign, run
 
 
 # --- the real command -------------------------------------------------------------------------------------------------
 
 
 def test_ray__a_node_that_dies_costs_nothing_but_time(cluster: Any, tmp_path: Path) -> None:
-    process, run, _ = begin_campaign(tmp_path, cluster.address)
+    process, _, run = begin_campaign(tmp_path, cluster.address)
     (node,) = (node for node in cluster.worker_nodes if busy_process(node))
     pull_the_plug(cluster, node)
     printed = end(process)
@@ -71,25 +70,28 @@ def test_ray__a_node_that_dies_costs_nothing_but_time(cluster: Any, tmp_path: Pa
 
 def test_ray__a_command_that_is_killed_and_run_again_is_uninterrupted(cluster: Any, tmp_path: Path) -> None:
     """The second command waits until Ray has ended the worker of the first one, which has no command any more."""
-    process, run, command = begin_campaign(tmp_path, cluster.address)
+    process, campaign, run = begin_campaign(tmp_path, cluster.address)
     os.kill(process.pid, signal.SIGKILL)
     end(process)
-    again = harness(*command)
-    assert again.returncode == 0, again.stdout + again.stderr
+    carried_out(campaign, run, "--ray", cluster.address)
     assert numbers(run) == numbers(sumo_run())
 
 
 def test_ray__on_this_machine_alone_interrupted_leaves_nothing(tmp_path: Path) -> None:
-    process, run, command = begin_campaign(tmp_path, "local")
+    process, campaign, run = begin_campaign(tmp_path, "local")
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does
-    printed = process.communicate(timeout=PATIENCE_S)[0]
-    assert process.returncode == 130, printed
-    assert printed.splitlines()[-1] == INTERRUPTED
-    assert "Traceback" not in printed
-    wait_for(lambda: not in_session(process.pid), "no process of it is left")
-    again = harness(*command[:-2])  # without Ray: either continues what the other began
-    assert again.returncode == 0, again.stdout + again.stderr
+    assert_interrupted(process, 130)
+    carried_out(campaign, run)  # without Ray: either continues what the other began
     assert numbers(run) == numbers(sumo_run())
+
+
+def assert_refused(cluster: Any, tmp_path: Path, run: Path, message: str) -> None:
+    """The command ends with exit code 2 and one message, and begins nothing."""
+    refused = harness("campaign", write_campaign(tmp_path, **BY_SUMO), "--out", run, "--ray", cluster.address)
+    assert refused.returncode == 2, refused.stdout + refused.stderr
+    (line,) = refused.stderr.splitlines()
+    assert line.startswith(message)
+    assert "started" not in refused.stdout
 
 
 def test_ray__nodes_of_other_versions_are_refused_by_name(cluster: Any, tmp_path: Path) -> None:
@@ -99,15 +101,11 @@ def test_ray__nodes_of_other_versions_are_refused_by_name(cluster: Any, tmp_path
     (tmp_path / "other" / "numba-0.1.dist-info" / "METADATA").write_text(metadata)
     path = os.pathsep.join([str(tmp_path / "other"), *filter(None, [os.environ.get("PYTHONPATH")])])
     node = add_node(cluster, env_vars={"PYTHONPATH": path}, node_name="old-machine")
+    message = "--ray: node old-machine: has other versions than this machine: numba 0.1, here "
     try:
-        campaign = write_campaign(tmp_path, **BY_SUMO)
-        refused = harness("campaign", campaign, "--out", tmp_path / "run", "--ray", cluster.address)
+        assert_refused(cluster, tmp_path, tmp_path / "run", message)
     finally:
         cluster.remove_node(node)
-    assert refused.returncode == 2, refused.stdout + refused.stderr
-    (line,) = refused.stderr.splitlines()
-    assert line.startswith("--ray: node old-machine: has other versions than this machine: numba 0.1, here ")
-    assert "started" not in refused.stdout
 
 
 def test_ray__a_node_that_does_not_see_the_run_folder_is_refused_by_name(cluster: Any, tmp_path: Path) -> None:
@@ -127,15 +125,11 @@ def test_ray__a_node_that_does_not_see_the_run_folder_is_refused_by_name(cluster
         if island.wait(PATIENCE_S):
             assert island.stderr is not None
             pytest.skip(f"no node with a disk of its own: {island.stderr.read()}")
-        campaign = write_campaign(tmp_path, **BY_SUMO)
-        refused = harness("campaign", campaign, "--out", folder / "run", "--ray", cluster.address)
+        message = f"--ray: node island: does not see the run folder {folder / 'run'} (use a folder that "
+        assert_refused(cluster, tmp_path, folder / "run", message)
     finally:
         for pid in in_session(island.pid):
             os.kill(pid, signal.SIGKILL)
-    assert refused.returncode == 2, refused.stdout + refused.stderr
-    (line,) = refused.stderr.splitlines()
-    assert line.startswith(f"--ray: node island: does not see the run folder {folder / 'run'} (use a folder that ")
-    assert "started" not in refused.stdout
 
 
 @pytest.mark.parametrize(

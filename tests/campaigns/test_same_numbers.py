@@ -10,33 +10,32 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+import platformdirs
 import pytest
 
 from harness.evaluation.tables import read_csv
-from tests.support.tiny import BY_SUMO, HARNESS, PATIENCE_S, SPEEDY, TABLES, harness, write_campaign, write_persona
+from tests.support.tiny import (
+    BY_SUMO,
+    HARNESS,
+    PATIENCE_S,
+    SPEEDY,
+    TABLES,
+    carried_out,
+    learned_run,
+    numbers,
+    sumo_run,
+    write_campaign,
+    write_persona,
+)
 
 pytestmark = pytest.mark.slow
 
 
-def campaign_in(folder: Path, *personas: Path) -> Path:
-    changes: dict[str, Any] = {**BY_SUMO, "personas": [str(each) for each in personas]}
-    return write_campaign(folder, **changes)
-
-
-def numbers(run: Path) -> dict[str, bytes]:
-    policies = {file.relative_to(run).as_posix(): file for file in sorted((run / "policies").rglob("policy.*"))}
-    return {name: (run / name).read_bytes() for name in (*TABLES, "training.csv")} | {
-        name: file.read_bytes() for name, file in policies.items()
-    }
-
-
-def on_a_terminal(*arguments: object) -> tuple[int, str]:
+def on_a_terminal(*arguments: object, environment: dict[str, str], cwd: Path) -> tuple[int, str]:
     """Run the command where it shows its progress as bars; its exit code and what it showed."""
     ours, theirs = pty.openpty()
-    environment = {**os.environ, "TERM": "xterm-256color"}
-    process = subprocess.Popen(
-        [HARNESS, *map(str, arguments)], stdin=theirs, stdout=theirs, stderr=theirs, env=environment
-    )
+    command = [HARNESS, *map(str, arguments)]
+    process = subprocess.Popen(command, stdin=theirs, stdout=theirs, stderr=theirs, env=environment, cwd=cwd)
     os.close(theirs)
     shown: list[bytes] = []
 
@@ -55,23 +54,52 @@ def on_a_terminal(*arguments: object) -> tuple[int, str]:
     return code, b"".join(shown).decode(errors="replace")
 
 
-def test_numbers__one_worker_or_four_with_a_display_or_without_from_anywhere(tmp_path: Path) -> None:
-    personas = (SPEEDY, write_persona(tmp_path, "anna"))
-    campaign = campaign_in(tmp_path / "here", *personas)
-    (tmp_path / "cwd").mkdir()
-    one = harness("campaign", campaign, "--out", tmp_path / "one", "--jobs", 1)
-    code, shown = on_a_terminal("campaign", campaign, "--out", tmp_path / "four", "--jobs", 4)
-    assert (one.returncode, code) == (0, 0), one.stderr + shown
+def test_numbers__of_four_workers_with_a_display_elsewhere_are_those_of_one_without(tmp_path: Path) -> None:
+    """And nothing is written anywhere else."""
+    folders = {name: tmp_path / name for name in ("cwd", "home", "tmp", "out")}
+    for folder in folders.values():
+        folder.mkdir()
+    compiled = folders["home"] / "cache" / "harness" / "compiled"  # machine code as on any machine after its first run
+    compiled.parent.mkdir(parents=True)
+    compiled.symlink_to(Path(platformdirs.user_cache_dir("harness")) / "compiled")
+    environment = {
+        **os.environ,
+        "TERM": "xterm-256color",
+        "HOME": str(folders["home"]),
+        "XDG_CACHE_HOME": str(folders["home"] / "cache"),
+        "TMPDIR": str(folders["tmp"]),
+    }
+    campaign, again = write_campaign(folders["out"] / "campaign", name="learned"), folders["out"] / "again"
+    command = ("campaign", campaign, "--out", again, "--jobs", 4)
+    code, shown = on_a_terminal(*command, environment=environment, cwd=folders["cwd"])
+    assert code == 0, shown
     assert "\x1b[" in shown  # it did draw bars
-    assert "\x1b[" not in one.stdout
-    assert numbers(tmp_path / "one") == numbers(tmp_path / "four")
+    assert "\x1b[" not in (learned_run().parent / "printed").read_text(encoding="utf-8")
+    assert numbers(again) == numbers(learned_run())
+    assert list(folders["cwd"].iterdir()) == []
+    left = {each.name for each in folders["tmp"].iterdir() if not each.name.startswith("torchinductor")}  # torch's
+    assert left == set()
+    assert {each.name for each in folders["home"].iterdir()} <= {"cache", ".config"}  # .config: matplotlib
+    assert {each.name for each in folders["out"].iterdir()} == {"campaign", "again"}
 
-    other_order = campaign_in(tmp_path / "there", *reversed(personas))
-    done = harness("campaign", other_order, "--out", "../reversed", "--jobs", 2, cwd=tmp_path / "cwd")
-    assert done.returncode == 0, done.stderr
+
+def rows_of(run: Path, persona: str) -> pd.DataFrame:
+    """The games of a persona, and those without one."""
+    episodes = read_csv(run / "episodes.csv")
+    return episodes[episodes["persona"].isin(["", persona])].reset_index(drop=True)
+
+
+def test_numbers__neither_another_persona_nor_the_order_of_personas_changes_a_row(tmp_path: Path) -> None:
+    anna = write_persona(tmp_path, "anna")
+    runs = [tmp_path / "first" / "run", tmp_path / "second" / "run"]
+    for run, personas, jobs in zip(runs, ([SPEEDY, anna], [anna, SPEEDY]), (1, 2), strict=True):
+        changes: dict[str, Any] = {**BY_SUMO, "personas": [str(each) for each in personas]}
+        carried_out(write_campaign(run.parent, **changes), run, "--jobs", jobs)
     for name in (*TABLES, "training.csv"):
-        tables = [read_csv(tmp_path / run / name) for run in ("one", "reversed")]
+        tables = [read_csv(run / name) for run in runs]
         columns = ("persona", "arm", "stage", "seed", "episode", "steps", "question", "metric")
         keys = [key for key in columns if key in tables[0]]
         first, second = (table.sort_values(keys, kind="stable").reset_index(drop=True) for table in tables)
         pd.testing.assert_frame_equal(first, second, check_exact=True)
+    pd.testing.assert_frame_equal(rows_of(runs[0], "speedy"), rows_of(sumo_run(), "speedy"))
+    assert set(rows_of(runs[0], "anna")["arm"]) == {"naive_alone", "naive_vs_sumo", "anna_alone", "naive_vs_anna"}

@@ -159,7 +159,7 @@ def test_lanes__nearest_lane_and_place_within_its_length(merge_net: Path) -> Non
     points = np.array([[50.0, -4.5], [110.0, -1.6], [110.0, -1.6], [-9.0, 8.0], [300.0, -1.6]])
     starts = np.array([False, False, True, False, False])
     lane = lanes.locate(points, starts)
-    assert [lanes.ids[row] for row in lane] == ["approach_0", ":merge_0_0", "approach_1", "approach_1", "exit_0"]
+    assert [lanes.ids[row] for row in lane] == ["approach_0", ":taper_0_0", "approach_1", "approach_1", "exit_0"]
     assert lanes.position(lane, points) == pytest.approx([50.0, 10.0, 100.0, 0.0, 90.0])
     assert [lanes.ids[row] for row in lanes.onward[lane[:2]]] == ["approach_0", "exit_0"]
 

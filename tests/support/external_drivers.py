@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import shutil
 from pathlib import Path
 from types import ModuleType
@@ -13,6 +12,7 @@ from harness.campaign.preflight import open_campaign
 from harness.drivers.external import ExternalDriver, find_driver
 from harness.errors import UsageError
 from tests.support.repository import REPOSITORY
+from tests.support.scripts import script
 
 
 def find(written: str, folder: Path, allow_code: bool = True) -> ExternalDriver:
@@ -51,9 +51,4 @@ def install(
 
 def fmu_example() -> ModuleType:
     """The module that builds the example of an FMU, egos/examples/fmu/build.py."""
-    spec = importlib.util.spec_from_file_location("build_twin", REPOSITORY / "egos/examples/fmu/build.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return script("../egos/examples/fmu/build.py")

@@ -20,7 +20,7 @@ from tests.support.tiny import write_campaign
 def planned(folder: Path, **changes: Any) -> tuple[dict[str, Stage], dict[str, str]]:
     """A campaign's stages and their keys, by id and in order."""
     campaign = open_campaign(write_campaign(folder, **changes))
-    stages = plan(campaign.document, [persona.name for persona in campaign.personas])
+    stages = plan(campaign.document, [persona.name for persona in campaign.personas], campaign.tunable)
     assert len({stage.id for stage in stages}) == len(stages)
     return {stage.id: stage for stage in stages}, stage_keys(campaign, stages)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import shutil
 import subprocess
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -14,6 +15,7 @@ from defusedxml import ElementTree
 
 from harness.replay import write_replay
 from harness.replay.sumo_gui import find_sumo_gui
+from tests.support.repository import REPOSITORY
 from tests.support.tiny import PATIENCE_S
 
 STEP_S = 0.1
@@ -33,25 +35,9 @@ Pose = tuple[float, float, float, float]  # x_m, y_m, heading_rad, speed_mps
 
 
 def write_merge_net(folder: Path) -> Path:
-    """Two lanes (y -6.4 to 0) that taper into one between x 100 and 130, and go on to x 220."""
-    (folder / "m.nod.xml").write_text(
-        """<nodes>
-        <node id="start" x="0" y="0" type="dead_end"/>
-        <node id="merge" x="100" y="0" type="priority" shape="100,-6.4 100,0 130,0 130,-3.2"/>
-        <node id="end" x="220" y="0" type="dead_end"/></nodes>"""
-    )
-    (folder / "m.edg.xml").write_text(
-        """<edges>
-        <edge id="approach" from="start" to="merge" numLanes="2" speed="13.89" spreadType="right"/>
-        <edge id="exit" from="merge" to="end" numLanes="1" speed="13.89"/></edges>"""
-    )
-    (folder / "m.con.xml").write_text(
-        '<connections><connection from="approach" to="exit" fromLane="1" toLane="0"/></connections>'
-    )
-    sources = ["-n", "m.nod.xml", "-e", "m.edg.xml", "-x", "m.con.xml", "-o", "merge.net.xml"]
-    subprocess.run([sumo_program("netconvert"), *sources], cwd=folder, check=True, capture_output=True)
+    """The net of tests/data/merge, two lanes that taper into one, with other types of vehicles in its route file."""
     (folder / "merge.rou.xml").write_text(ROUTES)
-    return folder / "merge.net.xml"
+    return Path(shutil.copy(REPOSITORY / "tests" / "data" / "merge" / "merge.net.xml", folder))
 
 
 def sumo_program(name: str) -> Path:
@@ -64,15 +50,11 @@ def drive(
     player: str, poses: Iterable[Pose], *, vehicle_type: str = "car", first_step: int = 0, outcome: str = ""
 ) -> pd.DataFrame:
     """Rows of a trace; `outcome` is reached with the first pose of speed 0, or else with the last."""
-    rows, reached = [], ""
-    listed = list(poses)
-    for k, (x, y, heading, speed) in enumerate(listed):
-        if speed == 0.0 or k == len(listed) - 1:
-            reached = outcome
-        rows.append((first_step + k, x, y, heading, speed, reached))
-    frame = pd.DataFrame(rows, columns=["step", "x_m", "y_m", "heading_rad", "speed_mps", "outcome"])
-    frame = frame.assign(episode=0, time_s=frame["step"] * STEP_S, player=player, vehicle_type=vehicle_type)
-    return frame.assign(acceleration_mps2=0.0, steering_rad=0.0, lapsed=False)
+    frame = pd.DataFrame(list(poses), columns=["x_m", "y_m", "heading_rad", "speed_mps"])
+    reached = (frame["speed_mps"] == 0.0).cummax() | (frame.index == len(frame) - 1)
+    frame = frame.assign(episode=0, step=first_step + frame.index, player=player, vehicle_type=vehicle_type)
+    frame = frame.assign(time_s=frame["step"] * STEP_S, acceleration_mps2=0.0, steering_rad=0.0, lapsed=False)
+    return frame.assign(outcome=np.where(reached, outcome, ""))
 
 
 def game(*players: pd.DataFrame) -> pd.DataFrame:
@@ -139,15 +121,7 @@ def write(trace: pd.DataFrame, net: Path, folder: Path, **changes: object) -> Pa
 def play(folder: Path) -> tuple[pd.DataFrame, str]:
     """What SUMO reports of a replay, one row per vehicle and step, and what it printed."""
     output = folder.parent / "played.xml"
-    command = [
-        str(sumo_program("sumo")),
-        "-c",
-        str(folder / "scene.sumocfg"),
-        "--fcd-output",
-        str(output),
-        "--precision",
-        "6",
-    ]
+    command = [sumo_program("sumo"), "-c", folder / "scene.sumocfg", "--fcd-output", output, "--precision", "6"]
     command += ["--fcd-output.attributes", "id,x,y,angle,type,speed"]
     environment = os.environ | {"SUMO_HOME": str(sumo_program("sumo").parent.parent)}  # for its XML schemas
     done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, env=environment, check=False)
