@@ -14,7 +14,8 @@ from tests.hostile.bad_documents import CAMPAIGNS, PERSONAS, POLICIES, SCENES
 from tests.hostile.bad_roads import NETS, ROUTE_FILES
 from tests.hostile.bad_run_folders import RUNS
 from tests.hostile.inputs import CHECK, Bad, Said, assert_refused, traces_of, write_project, write_run
-from tests.support.tiny import HARNESS, PATIENCE_S, in_session
+from tests.support.processes import in_session
+from tests.support.tiny import HARNESS, PATIENCE_S
 
 TABLES = {
     "campaign": CAMPAIGNS,

@@ -121,8 +121,8 @@ def write(trace: pd.DataFrame, net: Path, folder: Path, **changes: object) -> Pa
 def play(folder: Path) -> tuple[pd.DataFrame, str]:
     """What SUMO reports of a replay, one row per vehicle and step, and what it printed."""
     output = folder.parent / "played.xml"
-    command = [sumo_program("sumo"), "-c", folder / "scene.sumocfg", "--fcd-output", output, "--precision", "6"]
-    command += ["--fcd-output.attributes", "id,x,y,angle,type,speed"]
+    command: list[str | Path] = [sumo_program("sumo"), "-c", folder / "scene.sumocfg", "--precision", "6"]
+    command += ["--fcd-output", output, "--fcd-output.attributes", "id,x,y,angle,type,speed"]
     environment = os.environ | {"SUMO_HOME": str(sumo_program("sumo").parent.parent)}  # for its XML schemas
     done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, env=environment, check=False)
     assert done.returncode == 0, done.stderr

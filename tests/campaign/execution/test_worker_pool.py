@@ -15,20 +15,20 @@ from harness.campaign.execution.run_stages import MOST_CRASHES, run_stages
 from harness.campaign.execution.stage_run import Event, StageRun
 from harness.campaign.execution.worker_pool import WorkerPool
 from harness.campaign.plan.stages import Stage
-from harness.cli.messages import INTERRUPTED
 from harness.errors import StageFailed
 from tests.support.plans import empty_context
 from tests.support.plans import training_of as stage
+from tests.support.processes import in_session
 from tests.support.tiny import (
     BY_SUMO,
-    PATIENCE_S,
+    assert_interrupted,
     begin,
     end,
     harness,
-    in_session,
     sumo_run,
     tables,
     wait_for,
+    wait_until_nothing_is_left,
     workers_of,
     write_campaign,
 )
@@ -200,7 +200,7 @@ def test_campaign__a_worker_that_is_killed_costs_nothing_but_time(tmp_path: Path
     assert process.returncode == 0, printed
     assert "crashed  speedy-seed1: the worker died of SIGSEGV" in printed
     assert tables(run_folder) == tables(sumo_run())
-    wait_for(lambda: not in_session(process.pid), "no process of it is left")
+    wait_until_nothing_is_left(process)
 
 
 @pytest.mark.slow
@@ -208,11 +208,7 @@ def test_campaign__interrupted_and_killed_and_run_again_is_uninterrupted(tmp_pat
     process, run_folder, command = begin_campaign(tmp_path)
     wait_for_file(process, run_folder, "checkpoint.safetensors")
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does
-    printed = process.communicate(timeout=PATIENCE_S)[0]
-    assert process.returncode == 130
-    assert INTERRUPTED in printed
-    assert "Traceback" not in printed
-    wait_for(lambda: not in_session(process.pid), "no process of it is left")
+    assert_interrupted(process, 130)
     assert not (run_folder / "episodes.csv").exists()
 
     process = begin(*command)
@@ -231,8 +227,5 @@ def test_campaign__interrupted_while_its_workers_start_leaves_nothing(tmp_path: 
     process, run_folder, _ = begin_campaign(tmp_path)
     wait_for(lambda: workers_of(process.pid), "the first worker")
     os.killpg(process.pid, signal.SIGINT)
-    printed = process.communicate(timeout=PATIENCE_S)[0]
-    assert process.returncode == 130
-    assert "Traceback" not in printed
-    wait_for(lambda: not in_session(process.pid), "no process of it is left")
+    assert_interrupted(process, 130)
     assert (run_folder / "manifest.json").is_file()
