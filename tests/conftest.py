@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import sumo
 from hypothesis import HealthCheck, settings
 
 from harness.game.arrays import FloatArray
@@ -19,6 +16,7 @@ from harness.game.state import Bodies, State
 from harness.game.world import World
 from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.repository import REPOSITORY
+from tests.support.scenes import run_sumo_program
 from tests.support.shared import shared_folder
 from tests.support.slow import slow_tests
 from tests.support.stations import nearest_station_m
@@ -80,16 +78,6 @@ def generate_net(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path
         return folder / "net.net.xml"
 
     return generate
-
-
-def run_sumo_program(name: str, arguments: list[str], folder: Path) -> None:
-    """Run a program of the installed SUMO; fails with what it said."""
-    program = Path(sumo.SUMO_HOME) / "bin" / name
-    environment = {**os.environ, "SUMO_HOME": sumo.SUMO_HOME}
-    done = subprocess.run(
-        [program, *arguments], cwd=folder, env=environment, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
 
 
 @pytest.fixture(scope="session")

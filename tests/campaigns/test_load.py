@@ -43,7 +43,6 @@ from tests.support.chromium import launched, opener, ready_s, until
 from tests.support.pages import campaign, rendered
 from tests.support.rollouts import Steady, arm, play
 from tests.support.scenes import build_scene, drawn
-from tests.support.shared import built_once
 from tests.support.tiny import MERGE, SPEEDY
 
 weighing = pytest.mark.skipif(not Path("/proc/self/statm").is_file(), reason="the system does not say what it weighs")
@@ -141,21 +140,13 @@ WORK = {work.__name__: work for work in (soak, assessment, bare_libsumo)}
 
 def weighed(work: str) -> list[Weight]:
     """What the work weighed once it was warm."""
-
-    def build(folder: Path) -> None:
-        environment = os.environ | {"PYTHONPATH": PATH}
-        command = [sys.executable, __file__, work]
-        done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
-        assert done.returncode == 0, done.stderr
-        (folder / "weights.jsonl").write_text(done.stdout, encoding="utf-8")
-
-    lines = (built_once(f"weights_of_{work}", build) / "weights.jsonl").read_text(encoding="utf-8").splitlines()
-    weights = [Weight(**json.loads(line)) for line in lines]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    command = [sys.executable, __file__, work]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    assert done.returncode == 0, done.stderr
+    weights = [Weight(**json.loads(line)) for line in done.stdout.splitlines()]
     assert len(weights) == WEIGHED + 1
     return weights[WEIGHED // 4 :]
-
-
-PATH = os.pathsep.join(each for each in sys.path if each)
 
 
 def growth_mb(weights: list[Weight]) -> float:
@@ -167,30 +158,28 @@ def growth_mb(weights: list[Weight]) -> float:
 # --- what must be true ------------------------------------------------------------------------------------------------
 
 
+def assert_opens_nothing(weights: list[Weight]) -> None:
+    """No file is left open and no thread is started."""
+    assert len({(each.files, each.threads) for each in weights}) == 1
+
+
 @weighing
 @pytest.mark.slow
-def test_soak__a_million_game_steps_leave_memory_as_it_was() -> None:
+def test_soak__a_million_game_steps_leave_memory_as_it_was_and_open_nothing() -> None:
     weights = weighed("soak")
     assert weights[-1].done >= 0.99 * GAME_STEPS
     assert growth_mb(weights) <= SOAK_MB
+    assert_opens_nothing(weights)
 
 
 @weighing
 @pytest.mark.slow
-def test_assessment__thousands_of_games_add_no_memory_beyond_what_libsumo_keeps() -> None:
+def test_assessment__thousands_of_games_add_no_memory_beyond_what_libsumo_keeps_and_open_nothing() -> None:
     ours, theirs = weighed("assessment"), weighed("bare_libsumo")
     assert ours[-1].done == theirs[-1].done == ASSESSED
     games = 0.75 * ASSESSED
     assert growth_mb(ours) - growth_mb(theirs) <= games * ASSESSMENT_KB_PER_GAME / 1000.0
-
-
-@weighing
-@pytest.mark.slow
-@pytest.mark.parametrize("work", ["soak", "assessment"])
-def test_long_work__opens_no_files_and_starts_no_threads(work: str) -> None:
-    weights = weighed(work)
-    assert len({each.files for each in weights}) == 1
-    assert len({each.threads for each in weights}) == 1
+    assert_opens_nothing(ours)
 
 
 # --- a report of ten thousand episodes --------------------------------------------------------------------------------

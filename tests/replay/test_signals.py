@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
 from pathlib import Path
 from xml.etree import ElementTree as Xml
 
@@ -13,9 +11,9 @@ from defusedxml import ElementTree
 
 from harness.replay import write_replay
 from harness.replay.scenery import programmes
-from tests.support.replays import STEP_S, drive, straight, sumo_program
+from tests.support.replays import STEP_S, drive, straight
 from tests.support.repository import REPOSITORY
-from tests.support.tiny import PATIENCE_S
+from tests.support.scenes import run_sumo_program
 
 LEFT_ACROSS = REPOSITORY / "networks" / "left_across"
 
@@ -42,12 +40,8 @@ def shown(folder: Path, light: str) -> dict[int, str]:
     Xml.SubElement(events, "timedEvent", {"type": "SaveTLSStates", "source": light, "dest": str(output)})
     file = folder.parent / "events.add.xml"
     Xml.ElementTree(events).write(file)
-    command = [str(sumo_program("sumo")), "-c", str(folder / "scene.sumocfg")]
-    command += ["--additional-files", f"{folder / 'scene.add.xml'},{file}"]
-    environment = os.environ | {"SUMO_HOME": str(sumo_program("sumo").parent.parent)}
-    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, env=environment, check=False)
-    assert done.returncode == 0, done.stderr
-    assert done.stderr == ""
+    options = ["-c", str(folder / "scene.sumocfg"), "--additional-files", f"{folder / 'scene.add.xml'},{file}"]
+    assert run_sumo_program("sumo", options, folder) == ""
     found = {}
     for each in ElementTree.parse(output).getroot():
         found[round(float(each.get("time")) / STEP_S)] = each.get("state")

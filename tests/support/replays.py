@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import os
 import shutil
-import subprocess
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
@@ -14,9 +12,8 @@ import pandas as pd
 from defusedxml import ElementTree
 
 from harness.replay import write_replay
-from harness.replay.sumo_gui import find_sumo_gui
 from tests.support.repository import REPOSITORY
-from tests.support.tiny import PATIENCE_S
+from tests.support.scenes import run_sumo_program
 
 STEP_S = 0.1
 RAILS = (
@@ -38,12 +35,6 @@ def write_merge_net(folder: Path) -> Path:
     """The net of tests/data/merge, two lanes that taper into one, with other types of vehicles in its route file."""
     (folder / "merge.rou.xml").write_text(ROUTES)
     return Path(shutil.copy(REPOSITORY / "tests" / "data" / "merge" / "merge.net.xml", folder))
-
-
-def sumo_program(name: str) -> Path:
-    gui = find_sumo_gui()
-    assert gui is not None, "SUMO is not installed"
-    return gui.with_name(name)
 
 
 def drive(
@@ -119,13 +110,10 @@ def write(trace: pd.DataFrame, net: Path, folder: Path, **changes: object) -> Pa
 
 
 def play(folder: Path) -> tuple[pd.DataFrame, str]:
-    """What SUMO reports of a replay, one row per vehicle and step, and what it printed."""
+    """What SUMO reports of a replay, one row per vehicle and step, and what it complained of."""
     output = folder.parent / "played.xml"
-    command: list[str | Path] = [sumo_program("sumo"), "-c", folder / "scene.sumocfg", "--precision", "6"]
-    command += ["--fcd-output", output, "--fcd-output.attributes", "id,x,y,angle,type,speed"]
-    environment = os.environ | {"SUMO_HOME": str(sumo_program("sumo").parent.parent)}  # for its XML schemas
-    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, env=environment, check=False)
-    assert done.returncode == 0, done.stderr
+    options = ["-c", str(folder / "scene.sumocfg"), "--precision", "6", "--fcd-output", str(output)]
+    complaints = run_sumo_program("sumo", [*options, "--fcd-output.attributes", "id,x,y,angle,type,speed"], folder)
     rows = [
         {"label_s": float(step.get("time")), **vehicle.attrib}
         for step in ElementTree.parse(output).getroot()
@@ -133,7 +121,7 @@ def play(folder: Path) -> tuple[pd.DataFrame, str]:
     ]
     played = pd.DataFrame(rows)
     played[["x", "y", "angle", "speed"]] = played[["x", "y", "angle", "speed"]].astype(float)
-    return played.rename(columns={"id": "player"}), done.stderr
+    return played.rename(columns={"id": "player"}), complaints
 
 
 def without_the_held_picture(played: pd.DataFrame, last_step: int) -> pd.DataFrame:

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import os
-import shutil
-import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import sumo
 
 from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.road.scene.open_scene import OpenScene, open_scene
+from harness.road.xml.sumo_program import run_program
 from tests.support.stations import nearest_station_m
+from tests.support.tiny import PATIENCE_S
 
 STRAIGHT_NODES = '<node id="a" x="0" y="0"/><node id="b" x="300" y="0"/>'
 STRAIGHT_EDGES = '<edge id="road" from="a" to="b" numLanes="2" speed="13.89" spreadType="right"/>'
@@ -52,6 +50,14 @@ CARS = """
 """
 
 
+def run_sumo_program(name: str, options: Sequence[str], folder: Path) -> str:
+    """Run a program of the installed SUMO in a folder; it must succeed. What it complained of."""
+    done = run_program(name, options, folder, PATIENCE_S)
+    assert done is not None
+    assert done.returncode == 0, done.stderr
+    return done.stderr
+
+
 def build_scene(
     folder: Path,
     nodes: str = STRAIGHT_NODES,
@@ -70,10 +76,8 @@ def build_scene(
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "n.nod.xml").write_text(f"<nodes>{nodes}</nodes>")
     (folder / "n.edg.xml").write_text(f"<edges>{edges}</edges>")
-    program = shutil.which("netconvert", path=os.path.join(sumo.SUMO_HOME, "bin"))
-    assert program is not None
     files = ("-n", "n.nod.xml", "-e", "n.edg.xml", "-o", "n.net.xml")
-    subprocess.run([program, *files, *net_options], cwd=folder, check=True, capture_output=True)
+    run_sumo_program("netconvert", [*files, *net_options], folder)
     players = {name: place for name, place in places.items() if name != "goal"}
     vehicles = "".join(
         f"""<vehicle id="{name}" type="{"ego" if name == "ego" else "person"}_car" depart="0">

@@ -13,24 +13,6 @@ from harness.evaluation.recorded_game import BodyKind, RecordedGame
 from harness.game.world import World
 from tests.support.stations import nearest_station_m
 
-
-def drawn(**players: tuple[list[float], float, float, dict[int, str]]) -> pd.DataFrame:
-    """A trace of players that drive straight on approach_1 or _0 of networks/merge: x (m) per step, speed, y."""
-    rows: list[dict[str, object]] = []
-    for name, (places, speed_mps, y_m, outcomes) in players.items():
-        for step, x_m in enumerate(places):
-            cells: dict[str, object] = {
-                "episode": 0,
-                "step": step,
-                "time_s": step * 0.1,
-                "player": name,
-                "vehicle_type": "ego_car",
-            }
-            cells |= {"x_m": x_m, "y_m": y_m, "heading_rad": 0.0, "speed_mps": speed_mps, "acceleration_mps2": 0.0}
-            rows.append(cells | {"steering_rad": 0.0, "lapsed": False, "outcome": outcomes.get(step, "")})
-    return pd.DataFrame(rows)
-
-
 Pose = tuple[float, float, float, float]
 """x and y (m), heading (rad), speed (m/s)."""
 
@@ -40,23 +22,22 @@ def rows(
 ) -> list[dict[str, Any]]:
     """A player's rows of a trace from its poses in each step; `end`: its outcome in the last; `lapsed`: steps of a
     lapse of attention."""
-    cells = {"episode": 0, "vehicle_type": kind, "steering_rad": 0.0, "signals": "", "player": player}
-    result = []
-    for step, (x, y, heading, speed) in enumerate(poses):
-        before = poses[max(step - 1, 0)][3]
-        motion = {"x_m": x, "y_m": y, "heading_rad": heading, "speed_mps": speed}
-        acceleration = (speed - before) / 0.1
-        outcome = end if step == len(poses) - 1 else ""
-        row = {
-            **cells,
-            **motion,
-            "lapsed": step in lapsed,
-            "step": step,
-            "time_s": 0.1 * step,
-            "acceleration_mps2": acceleration,
-        }
-        result.append({**row, "outcome": outcome})
-    return result
+    table = pd.DataFrame(list(poses), columns=["x_m", "y_m", "heading_rad", "speed_mps"], dtype=float)
+    step = table.index
+    table = table.assign(episode=0, step=step, time_s=0.1 * step, player=player, vehicle_type=kind)
+    table = table.assign(acceleration_mps2=table["speed_mps"].diff().fillna(0.0) / 0.1, steering_rad=0.0)
+    last = step == len(table) - 1
+    return table.assign(signals="", lapsed=step.isin(lapsed), outcome=np.where(last, end, "")).to_dict("records")
+
+
+def drawn(**players: tuple[list[float], float, float, dict[int, str]]) -> pd.DataFrame:
+    """A trace of players that drive straight on approach_1 or _0 of networks/merge: x (m) per step, speed, y; and
+    their outcomes by the step."""
+    table: list[dict[str, Any]] = []
+    for name, (places, speed_mps, y_m, outcomes) in players.items():
+        made = rows(name, [(x_m, y_m, 0.0, speed_mps) for x_m in places], kind="ego_car")
+        table += [{**row, "outcome": outcomes.get(row["step"], "")} for row in made]
+    return pd.DataFrame(table)
 
 
 def along(x: float, y: float, heading: float, speed: float, steps: int) -> list[Pose]:
