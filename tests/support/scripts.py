@@ -10,7 +10,7 @@ from tests.support.repository import REPOSITORY
 
 
 def script(path: str) -> ModuleType:
-    """A script below `docs/`, such as "game/figures.py". As when it is run, it finds the modules beside it."""
+    """A script by its path from `docs/`, such as "game/figures.py". As when it is run, it finds modules beside it."""
     file = REPOSITORY / "docs" / path
     name = f"docs_{file.parent.name}_{file.stem}"
     spec = importlib.util.spec_from_file_location(name, file)
