@@ -7,12 +7,14 @@ and then renamed. A killed process leaves the temporary file behind; `drop_scrat
 from __future__ import annotations
 
 import errno
+import hashlib
 import os
 import stat
 import tempfile
 from pathlib import Path
 
 _SCRATCH = ".part"
+_MOST_HASHED_BYTES = 1_000_000_000
 
 
 def write_atomically(path: Path, content: bytes) -> None:
@@ -91,6 +93,11 @@ def content_of(path: Path, most_bytes: int) -> bytes:
     if len(content) > most_bytes:
         raise OSError(errno.EFBIG, _too_large(len(content), most_bytes), str(path))
     return content
+
+
+def digest_of_file(path: Path) -> str:
+    """SHA-256 of a plain file's content. Raises OSError as `content_of` does, and for more than 1 GB."""
+    return hashlib.sha256(content_of(path, _MOST_HASHED_BYTES)).hexdigest()
 
 
 def leads_out(path: Path, folder: Path) -> bool:

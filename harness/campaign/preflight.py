@@ -17,7 +17,6 @@ from typing import Any
 from pydantic import ConfigDict
 
 from harness.campaign.plan.campaign_checks import check_names, check_people
-from harness.campaign.plan.persona_remarks import persona_remarks
 from harness.campaign.plan.strategy_stages import crossplay_name
 from harness.campaign.trained_policies import check_policies, find_policies
 from harness.config.campaign import LEARNED, SUMO, Campaign, DocumentPath, Ego
@@ -83,11 +82,6 @@ class OpenCampaign:
     def tunable(self) -> bool:
         """Whether the ego is external and has tunable parameters."""
         return _is_tunable(self.ego_driver)
-
-    @property
-    def persona_remarks(self) -> list[str]:
-        """What in the payoffs of the personas does not suit the scene: a sentence each."""
-        return persona_remarks(self.personas, self.scene.world, self.document.training.discount)
 
     def hash_of(self, path: Path) -> str:
         """SHA-256 of one of those files."""
@@ -226,11 +220,8 @@ def _ignored_tables(file: Path, document: Campaign, ego_driver: ExternalDriver |
         reasons["retraining"] = "is not trained"
     for name, reason in reasons.items():
         if name in document.model_fields_set:
-            message, remedy = (
-                f"this ego {reason}: the table would be ignored",
-                "leave out this table, or name another ego",
-            )
-            yield Problem(str(file), name, message, remedy)
+            message = f"this ego {reason}: the table would be ignored"
+            yield Problem(str(file), name, message, "leave out this table, or name another ego")
 
 
 def _find_other_egos(

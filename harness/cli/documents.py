@@ -109,6 +109,7 @@ def check(
 
 def _check_campaign(file: Path, allow_code: bool, as_json: bool, console: Console) -> None:
     from harness.campaign.execution.repeat_check import varying_drivers
+    from harness.campaign.plan.persona_remarks import persona_remarks
     from harness.campaign.plan.plan import plan
     from harness.campaign.preflight import open_campaign
     from harness.config.campaign import LEARNED
@@ -120,7 +121,8 @@ def _check_campaign(file: Path, allow_code: bool, as_json: bool, console: Consol
     notes = opened.ego_driver.notes if opened.ego_driver is not None else ()
     ego = [] if opened.document.ego.driver == LEARNED else [messages.ego(opened), *notes]
     ego = [plain(each) for each in (*ego, *(f"{driver}: {told}" for driver, told in varying.items()))]
-    remarks = [*opened.scene.warnings, *opened.persona_remarks, *ego]
+    unsuited = persona_remarks(opened.personas, opened.scene.world, opened.document.training.discount)
+    remarks = [*opened.scene.warnings, *unsuited, *ego]
     print_plain([f"{file} is in order.", *remarks], console)
     print_plain([messages.work(opened, stages), *messages.stage_lines(stages)], console)
     if as_json:

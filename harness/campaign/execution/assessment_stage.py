@@ -14,7 +14,6 @@ from contextlib import closing
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from harness.assessment.rollout import Game, SeatedArm, assess
@@ -22,7 +21,7 @@ from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import StageRun
 from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.storage.arm_tables import PLAYED, arm_tables
-from harness.campaign.storage.checksums import mismatches, read_checksums, write_checksums
+from harness.campaign.storage.checksums import intact_record, write_checksums
 from harness.campaign.storage.versions import versions_of_numbers
 from harness.errors import StageFailed
 from harness.evaluation.competence import goals_alone
@@ -51,9 +50,7 @@ class Segment:
 
     def errors(self) -> int | None:
         """How many of its games could not be played; None if it is not complete, or was played by other versions."""
-        record = read_checksums(self.file("json"))
-        if record is None or record.get("versions") != versions_of_numbers() or mismatches(record, self.folder):
-            return None
+        record = intact_record(self.file("json"), self.folder, versions=versions_of_numbers()) or {}
         errors = record.get("errors")
         return errors if isinstance(errors, int) else None
 
@@ -132,12 +129,7 @@ def play_segments(arm: SeatedArm, segments: Sequence[Segment], labels: Mapping[s
     return sum(found or 0 for found in errors.values())
 
 
-def join_segments(
-    segments: Sequence[Segment],
-    played: Path,
-    traces: Path,
-    labels: Mapping[str, str | int] = MappingProxyType({}),
-) -> None:
+def join_segments(segments: Sequence[Segment], played: Path, traces: Path, labels: Mapping[str, str | int]) -> None:
     """Join the segments of an arm into its log. `labels` name the arm in the metadata of its traces."""
     write_csv(joined("played", [read_csv(segment.file(PLAYED)) for segment in segments]), played)
     join_traces([segment.file(_TRACES) for segment in segments], traces, labels)

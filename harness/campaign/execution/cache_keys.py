@@ -6,8 +6,6 @@ changes keys: finished stages are then carried out again.
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Sequence
 from typing import Any
 
@@ -23,6 +21,7 @@ from harness.campaign.plan.stages import (
 )
 from harness.campaign.plan.strategy_stages import training_settings
 from harness.campaign.preflight import OpenCampaign
+from harness.campaign.storage.checksums import digest_of
 from harness.drivers.policy_file import policy_files
 from harness.drivers.reference_drivers import reference_identity
 
@@ -37,7 +36,7 @@ def stage_keys(campaign: OpenCampaign, stages: Sequence[Stage]) -> dict[str, str
     keys: dict[str, str] = {}
     for stage in stages:
         inputs = {**shared, **_inputs(campaign, stage), "needs": [keys[name] for name in stage.needs]}
-        keys[stage.id] = hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
+        keys[stage.id] = digest_of(inputs)
     return keys
 
 

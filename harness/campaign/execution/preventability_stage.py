@@ -20,7 +20,7 @@ from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import StageRun
 from harness.campaign.plan.stages import PreventabilityStage, SumoDriven
 from harness.campaign.storage.arm_tables import arm_tables
-from harness.campaign.storage.checksums import read_checksums, write_checksums
+from harness.campaign.storage.checksums import intact_record, write_checksums
 from harness.campaign.storage.run_folder import JUDGED
 from harness.campaign.storage.versions import versions_of_numbers
 from harness.drivers.car import car_of
@@ -137,9 +137,7 @@ def outcome_of(record: Mapping[str, Any]) -> str:
 def _stored(file: Path, first: bool) -> dict[int, dict[str, str]] | None:
     """The games that a driver has played; None if there are none of this version, or if some could not be played and
     this is the command's first attempt, which plays them again."""
-    record = read_checksums(file)
-    if record is None or record.get("versions") != versions_of_numbers():
-        return None
+    record = intact_record(file, file.parent, versions=versions_of_numbers()) or {}
     try:
         outcomes = {int(episode): {**outcome} for episode, outcome in record["outcomes"].items()}
         failed = any(each["error"] for each in outcomes.values())

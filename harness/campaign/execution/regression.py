@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -23,11 +22,9 @@ from harness.drivers.policy_file import LearnedDriver, policy_files, read_policy
 from harness.drivers.protocol import Driver
 from harness.drivers.sumo import SumoDriver
 from harness.errors import Problem, UsageError, collect
-from harness.files import content_of
+from harness.files import digest_of_file
 from harness.game.roles import EGO
 from harness.road.scene.open_scene import OpenScene, open_scene
-
-_MOST_BYTES = 1_000_000_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,6 +117,6 @@ def _person(file: Path, person: PinnedPerson) -> Mixture:
 
 def _sha256(file: Path) -> str:
     try:
-        return hashlib.sha256(content_of(file, _MOST_BYTES)).hexdigest()
+        return digest_of_file(file)
     except OSError as error:
         raise UsageError.of(file, "", str(error.strerror), "restore the file") from None

@@ -8,7 +8,6 @@ campaign runs, with a warning on the terminal and in the report. The answer is k
 
 from __future__ import annotations
 
-import hashlib
 import json
 from pathlib import Path
 
@@ -16,8 +15,8 @@ from pydantic import TypeAdapter, ValidationError
 
 from harness.assessment.repeated_game import difference_when_repeated
 from harness.campaign.preflight import OpenCampaign
+from harness.campaign.storage.checksums import digest_of
 from harness.campaign.storage.run_folder import RunFolder
-from harness.drivers.external import ExternalDriver
 from harness.files import make_folder, write_atomically
 
 CHECKING = "playing a game twice"
@@ -30,18 +29,19 @@ def varying_drivers(campaign: OpenCampaign, folder: RunFolder | None = None) -> 
     words. With a run folder, what it knows already is not played."""
     file = folder.path / ".stages" / "repeats.json" if folder is not None else None
     known = _known(file) if file is not None else {}
-    drivers = [each for each in (campaign.ego_driver, *campaign.other_egos.values()) if each is not None]
+    scene = {name: campaign.hash_of(campaign.scene.folder / name) for name in campaign.scene.document.files}
     found = {}
-    for driver in drivers:
-        if driver.kind in _CODE:
-            key = _key(campaign, driver)
-            if key not in known:
-                sampled = driver is campaign.ego_driver and campaign.ego_persona.decisions == "sampled"
-                known[key] = difference_when_repeated(driver, campaign.scene.folder, sampled)
-                if file is not None:
-                    make_folder(file.parent)
-                    write_atomically(file, json.dumps(known, indent=1).encode())
-            found[driver.written] = known[key]
+    for driver in (campaign.ego_driver, *campaign.other_egos.values()):
+        if driver is None or driver.kind not in _CODE:
+            continue
+        key = digest_of([driver.identity, scene])
+        if key not in known:
+            sampled = driver is campaign.ego_driver and campaign.ego_persona.decisions == "sampled"
+            known[key] = difference_when_repeated(driver, campaign.scene.folder, sampled)
+            if file is not None:
+                make_folder(file.parent)
+                write_atomically(file, json.dumps(known, indent=1).encode())
+        found[driver.written] = known[key]
     return {name: difference for name, difference in found.items() if difference}
 
 
@@ -50,8 +50,3 @@ def _known(file: Path) -> dict[str, str]:
         return TypeAdapter(dict[str, str]).validate_json(file.read_bytes())
     except (OSError, ValidationError):
         return {}
-
-
-def _key(campaign: OpenCampaign, driver: ExternalDriver) -> str:
-    scene = {name: campaign.hash_of(campaign.scene.folder / name) for name in campaign.scene.document.files}
-    return hashlib.sha256(json.dumps([driver.identity, scene], sort_keys=True).encode()).hexdigest()

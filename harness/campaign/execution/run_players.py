@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -32,13 +31,11 @@ from harness.drivers.car import car_of
 from harness.drivers.external import find_driver
 from harness.drivers.protocol import Driver
 from harness.errors import UsageError
-from harness.files import content_of
+from harness.files import digest_of_file
 from harness.game.initial_state import member_in_episode
 from harness.game.roles import EGO
 from harness.road.scene.open_scene import OpenScene, open_scene
 from harness.shipped_documents import shipped
-
-_MOST_BYTES = 1_000_000_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,9 +148,6 @@ def policies_of_run(run: Path, written: str | None, hashes: Mapping[str, str]) -
 def _holds(folder: Path, read: Mapping[str, str]) -> bool:
     """Whether a folder has these files, by their path in it, with these checksums."""
     try:
-        return all(
-            hashlib.sha256(content_of(folder / place, _MOST_BYTES)).hexdigest() == digest
-            for place, digest in read.items()
-        )
+        return all(digest_of_file(folder / place) == digest for place, digest in read.items())
     except OSError:
         return False

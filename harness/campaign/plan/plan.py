@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from harness.campaign.plan.best_responses import plan_best_responses
-from harness.campaign.plan.iterated_rounds import PersonaRounds, Planned, pairing, persona_rounds
+from harness.campaign.plan.iterated_rounds import PersonaRounds, Planned, pairing, persona_rounds, plan_best_responses
 from harness.campaign.plan.paper_rounds import plan_paper_rounds, plan_robust, plan_searches
 from harness.campaign.plan.stages import AssessmentStage, PreventabilityStage, Stage, TrainingStage
 from harness.campaign.plan.strategy_stages import SeedStages, crossplay_name, ego_learns

@@ -8,7 +8,6 @@ earlier results fits neither inputs that have changed nor results that are half 
 
 from __future__ import annotations
 
-import hashlib
 import importlib.metadata
 import json
 from collections.abc import Iterator, Mapping
@@ -17,7 +16,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, ValidationError
 
-from harness.campaign.storage.checksums import checksums_of, mismatches, read_checksums
+from harness.campaign.storage.checksums import checksums_of, digest_of, intact_record
 from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.versions import digest_of_sources
 from harness.config.toml_reading import Document
@@ -80,10 +79,9 @@ class RunResult(Document):
 
 def kept_result(folder: RunFolder, manifest: Mapping[str, Any]) -> RunResult | None:
     """The result of a run whose results are all there, as this program would make them; None if they are not."""
-    record = read_checksums(_file(folder))
-    if record is None or record.get("key") != _key(folder, manifest) or mismatches(record, folder.path):
-        return None
-    if set(record["files"]) != {file.relative_to(folder.path).as_posix() for file in _results(folder)}:
+    record = intact_record(_file(folder), folder.path, key=_key(folder, manifest))
+    names = {file.relative_to(folder.path).as_posix() for file in _results(folder)}
+    if record is None or set(record.get("files", ())) != names:
         return None
     try:
         return RunResult.model_validate_json(json.dumps(record["result"]))
@@ -113,5 +111,4 @@ def _results(folder: RunFolder) -> Iterator[Path]:
 def _key(folder: RunFolder, manifest: Mapping[str, Any]) -> str:
     stages = {name: (folder.done(name) or {}).get("files") for name in manifest["stages"]}
     libraries = {name: importlib.metadata.version(name) for name in _DRAWN_WITH}
-    made_from = [dict(manifest), stages, libraries, digest_of_sources()]
-    return hashlib.sha256(json.dumps(made_from, sort_keys=True).encode()).hexdigest()
+    return digest_of([dict(manifest), stages, libraries, digest_of_sources()])

@@ -10,8 +10,6 @@ The tables are made again when the log or the sources have changed: a new metric
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -19,7 +17,7 @@ from typing import Any
 
 import pandas as pd
 
-from harness.campaign.storage.checksums import checksums_of, mismatches, read_checksums, write_checksums
+from harness.campaign.storage.checksums import checksums_of, digest_of, intact_record, write_checksums
 from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.versions import digest_of_sources
 from harness.environments.recorded import recorded_game
@@ -50,8 +48,9 @@ def arm_tables(folder: RunFolder, stage: str, scene: OpenScene | None = None) ->
     Raises UsageError for a damaged log.
     """
     work, record = folder.work(stage), folder.work(stage) / "tables.json"
-    key, stored = _key(folder, stage), read_checksums(record) or {}
-    if stored.get("key") == key and stored.get("files") and not mismatches(stored, folder.path):
+    key = _key(folder, stage)
+    stored = intact_record(record, folder.path, key=key)
+    if stored is not None and stored.get("files"):
         return ArmTables(**{name: read_csv(work / f"{name}.csv") for name in ArmTables.__dataclass_fields__})
     made = _made(folder, stage, scene or open_scene(folder.scene))
     for name, table in vars(made).items():
@@ -67,7 +66,7 @@ def _key(folder: RunFolder, stage: str) -> str:
     except OSError as error:
         message = f"can't be read: {error.strerror}"
         raise UsageError.of(Path(str(error.filename)), "", message, "run the campaign again") from None
-    return hashlib.sha256(json.dumps(made_from, sort_keys=True).encode()).hexdigest()
+    return digest_of(made_from)
 
 
 def _made(folder: RunFolder, stage: str, scene: OpenScene) -> ArmTables:

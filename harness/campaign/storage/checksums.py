@@ -40,12 +40,25 @@ def read_checksums(path: Path) -> dict[str, Any] | None:
     return record if isinstance(record, dict) else None
 
 
+def intact_record(path: Path, top: Path, **facts: Any) -> dict[str, Any] | None:
+    """The record of a file, where it has these facts and the files below `top` are as it says; None otherwise."""
+    record = read_checksums(path)
+    if record is None or any(record.get(name) != fact for name, fact in facts.items()) or mismatches(record, top):
+        return None
+    return record
+
+
 def mismatches(record: Mapping[str, Any], top: Path) -> list[Path]:
     """The files below `top` that are not as their checksums say."""
     checksums = record.get("files", {})
     if not isinstance(checksums, dict):
         return [top]
     return [top / name for name, expected in checksums.items() if not _matches(top / name, expected)]
+
+
+def digest_of(inputs: Any) -> str:
+    """SHA-256 of a JSON value: the key of what is made from these inputs."""
+    return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
 
 
 def _matches(file: Path, expected: Any) -> bool:

@@ -19,7 +19,6 @@ its inputs, written last. A folder is a run folder once it has a manifest.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import shutil
@@ -34,14 +33,13 @@ from harness.campaign.storage.locks import InUse, only_one, wait_for_workers
 from harness.campaign.storage.manifest import RUN_AGAIN, StageEntry, read_manifest
 from harness.campaign.storage.run_log import LOG, run_log
 from harness.errors import Problem, UsageError
-from harness.files import content_of, drop_scratch, leads_out, make_folder, write_atomically
+from harness.files import content_of, digest_of_file, drop_scratch, leads_out, make_folder, write_atomically
 
 MANIFEST = "manifest.json"
 JUDGED = "reference_drivers.csv"
 """The table that the judgement of an arm's failures makes."""
 _PATIENCE_S = 10.0  # the time that workers of a killed command may take to end
 _MOST_MANIFEST_BYTES = 50_000_000
-_MOST_SCENE_BYTES = 1_000_000_000
 _ANY_STAGE = {"kind": "training", "name": "", "seed": 0, "status": "done"}
 
 
@@ -53,7 +51,7 @@ def _has_only_locks(folder: Path) -> bool:
 
 def _is_one_of(file: Path, hashes: Mapping[str, str]) -> bool:
     try:
-        return hashlib.sha256(content_of(file, _MOST_SCENE_BYTES)).hexdigest() in hashes.values()
+        return digest_of_file(file) in hashes.values()
     except OSError:
         return False
 

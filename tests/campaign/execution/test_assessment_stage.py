@@ -27,7 +27,7 @@ from tests.support.repository import REPOSITORY
 from tests.support.rollouts import Steady, arm
 
 EPISODES = 7
-LABELS = {"arm": "naive_vs_sumo", "persona": "", "seed": 1}
+LABELS: dict[str, str | int] = {"arm": "naive_vs_sumo", "persona": "", "seed": 1}
 FIRST, AGAIN = Attempt(), Attempt(first=False)
 
 
@@ -49,7 +49,7 @@ def play(
     segments = segments_of(folder / "segments", EPISODES)
     run = StageRun(context=empty_context(folder), attempt=attempt, on_start=note)
     errors = play_segments(assessed, segments, LABELS, run)
-    join_segments(segments, folder / PLAYED, folder / "traces.parquet")
+    join_segments(segments, folder / PLAYED, folder / "traces.parquet", LABELS)
     return errors, played
 
 
@@ -185,7 +185,7 @@ class Anyone:
 parts = segments.segments_of(folder / "segments", episodes)
 run = StageRun(context=empty_context(folder))
 segments.play_segments(Anyone, parts, {"arm": "a", "persona": "", "seed": 1}, run)
-segments.join_segments(parts, folder / "played.csv", folder / "t.parquet")
+segments.join_segments(parts, folder / "played.csv", folder / "t.parquet", {})
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
 
