@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from harness.game.arrays import FloatArray
-from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import draw_initial_state
 from harness.reports.net_page import Drawing, DrawnShape
 from harness.road.net.net_listing import ListedJunction, ListedLane
@@ -73,11 +72,9 @@ def _routes_and_goals(scene: OpenScene) -> Iterator[DrawnShape]:
 
 
 def _starts(scene: OpenScene) -> Iterator[DrawnShape]:
-    players = len(scene.places)
-    distribution = scene.start_distribution([HumanFactors()] * players, [1.0] * players)
     for k in range(_STARTS):
-        state = draw_initial_state(distribution, "drawing", k)
-        for player in range(players):
+        state = draw_initial_state(scene.usual_starts, "drawing", k)
+        for player in range(len(scene.places)):
             point = np.array([[state.x_m[player], state.y_m[player]]])
             text = f"start of {scene.world.roles[player]}, {state.speed_mps[player]:.1f} m/s"
             yield DrawnShape(points=point, kind=f"start {_kind(player)}", text=text)

@@ -8,11 +8,9 @@ from rich.table import Table
 from rich.text import Text
 
 from harness.errors import plain
-from harness.maps.candidates import CandidateKind, ListedConflict, Priority
+from harness.maps.candidates import Candidate, CandidateKind, LaneWay, Priority
 from harness.maps.game_plans import GamePlan
 from harness.road.net.net_listing import ListedLane
-
-_RULES = {Priority.FIRST: "the first", Priority.FIRST_TO_ARRIVE: "first to arrive", Priority.NONE: "no rule"}
 
 
 def lane_table(lanes: Sequence[ListedLane]) -> Table:
@@ -25,12 +23,12 @@ def lane_table(lanes: Sequence[ListedLane]) -> Table:
     return table
 
 
-def conflict_table(conflicts: Sequence[ListedConflict]) -> Table:
-    """A row for each conflict."""
+def conflict_table(conflicts: Sequence[Candidate]) -> Table:
+    """A row for each conflict of two lanes, numbered from 1."""
     table = _table("conflict", "junction", "kind", "first", "second", "priority")
-    for each in conflicts:
-        kind = "merging" if each.merging else "crossing"
-        table.add_row(str(each.number), each.junction, kind, _way(each.first), _way(each.second), _priority(each))
+    for number, each in enumerate(conflicts, start=1):
+        kind = "merging" if each.kind is CandidateKind.MERGE else "crossing"
+        table.add_row(str(number), each.junction, kind, _way(each.first), _way(each.second), _priority(each))
     return table
 
 
@@ -48,30 +46,24 @@ def plan_table(rows: Sequence[tuple[GamePlan, str]]) -> Table:
 
 def plan_priority(plan: GamePlan) -> str:
     """Which player has priority."""
-    candidate = plan.candidate
-    if candidate.kind is CandidateKind.ZEBRA:
+    if plan.candidate.kind is CandidateKind.ZEBRA:
         return "the person"
-    first_is = {Priority.FIRST: "the ego"}
-    return _with_signals(first_is.get(candidate.priority, _RULES[candidate.priority]), candidate.with_signals)
+    return _priority(plan.candidate, first="the ego")
 
 
-def conflict_words(conflict: ListedConflict) -> str:
-    """The ways and the priority of a conflict."""
-    verb = "merges with" if conflict.merging else "crosses"
-    ways = f"{_way(conflict.first)} {verb} {_way(conflict.second)}"
-    return f"{ways}; priority: {_priority(conflict)}"
+def conflict_words(conflict: Candidate) -> str:
+    """The ways and the priority of a conflict of two lanes."""
+    verb = "merges with" if conflict.kind is CandidateKind.MERGE else "crosses"
+    return f"{_way(conflict.first)} {verb} {_way(conflict.second)}; priority: {_priority(conflict)}"
 
 
-def _way(lanes: tuple[str, str]) -> str:
-    return " to ".join(lanes)
+def _way(way: LaneWay | None) -> str:
+    return "" if way is None else f"{way.start.getID()} to {way.end.getID()}"
 
 
-def _priority(conflict: ListedConflict) -> str:
-    return _with_signals(_RULES[conflict.priority], conflict.with_signals)
-
-
-def _with_signals(rule: str, signals: bool) -> str:
-    return f"signals, then {rule}" if signals else rule
+def _priority(conflict: Candidate, first: str = "the first") -> str:
+    rules = {Priority.FIRST: first, Priority.FIRST_TO_ARRIVE: "first to arrive", Priority.NONE: "no rule"}
+    return f"signals, then {rules[conflict.priority]}" if conflict.with_signals else rules[conflict.priority]
 
 
 def _table(*columns: str) -> Table:

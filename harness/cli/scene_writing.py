@@ -15,8 +15,7 @@ from harness.errors import Problem, UsageError, plain
 from harness.files import make_folder, write_atomically
 from harness.maps.candidates import CandidateKind
 from harness.maps.game_plans import GamePlan
-from harness.maps.net_part import write_part
-from harness.maps.open_map import OpenMap
+from harness.maps.open_map import OpenMap, write_part
 from harness.road.net.network import KEPT_M
 from harness.road.scene.load_check import check_loads
 from harness.road.scene.open_scene import open_scene

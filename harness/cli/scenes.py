@@ -74,7 +74,7 @@ def show_scene(
         from harness.reports.net_page import write_net_page
 
         title = scene.document.name if scene is not None else path.name
-        places = ((each.number, each.place, conflict_words(each)) for each in conflicts)
+        places = ((k, each.place, conflict_words(each)) for k, each in enumerate(conflicts, start=1))
         write_net_page(drawing_of(title, lanes, junctions, places, scene), html)
         print_plain([f"Page: {html}"], console)
 

@@ -6,7 +6,7 @@ Connections of the same two pairs of edges are one candidate, whatever their lan
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, auto
 from itertools import chain, combinations
 
@@ -38,21 +38,6 @@ class Priority(Enum):
     FIRST = auto()
     FIRST_TO_ARRIVE = auto()
     NONE = auto()  # the net has no rule
-
-
-@dataclass(frozen=True, kw_only=True)
-class ListedConflict:
-    """A conflict of two connections of a junction. If one of them has priority, it is the first."""
-
-    number: int
-    junction: str
-    merging: bool  # both lead to the same lane; else they cross
-    first: tuple[str, str]
-    """The lanes before and behind the junction."""
-    second: tuple[str, str]
-    priority: Priority
-    with_signals: bool
-    place: FloatArray  # [2] where they cross, or where the common lane begins
 
 
 class CandidateKind(Enum):
@@ -93,7 +78,7 @@ class Candidate:
     junction: str
     first: LaneWay
     second: LaneWay | None  # None at a zebra crossing: the second is on foot
-    place: FloatArray  # [2]
+    place: FloatArray  # [2] where they cross, or where the common lane begins
     priority: Priority = Priority.NONE
     with_signals: bool = False
     footway: FloatArray | None = None  # [2, 2] middle line of a zebra crossing
@@ -105,31 +90,40 @@ class Candidate:
         return list(CandidateKind).index(self.kind), self.junction, self.first.edges, second
 
 
-def listed_conflicts(net: Net, junctions: Sequence[str]) -> list[ListedConflict]:
-    """The conflicts at junctions, numbered from 1 in the order of the junctions."""
+def listed_conflicts(net: Net, junctions: Sequence[str]) -> list[Candidate]:
+    """The conflicts at junctions, lane by lane, in the order of the junctions: each a merge or a crossing."""
     feeders = Feeders(net)
-    found: list[ListedConflict] = []
+    found: list[Candidate] = []
     for junction in junctions:
         links = net.getNode(junction).getConnections()
         streams = {link: Stream(link, feeders) for link in links}
         for one, other in foe_pairs(links):
             overlap = overlap_of(streams[one], streams[other])
-            if overlap is None:
-                continue
-            first, second, priority = in_order(one, other)
-            found.append(
-                ListedConflict(
-                    number=len(found) + 1,
-                    junction=junction,
-                    merging=one.getToLane() is other.getToLane(),
-                    first=(first.getFromLane().getID(), first.getToLane().getID()),
-                    second=(second.getFromLane().getID(), second.getToLane().getID()),
-                    priority=priority,
-                    with_signals=bool(one.getTLSID() or other.getTLSID()),
-                    place=place_of(one, other, overlap),
-                )
-            )
+            if overlap is not None:
+                merging = one.getToLane() is other.getToLane()
+                found.append(_conflict(CandidateKind.MERGE if merging else CandidateKind.CROSSING, one, other, overlap))
     return found
+
+
+def _conflict(kind: CandidateKind, one: Connection, other: Connection, overlap: BaseGeometry) -> Candidate:
+    """The conflict of two connections with a common area. If one of them has priority, it is the first."""
+    one_yields, first_come = yields_to(one, other)
+    other_yields, _ = yields_to(other, one)
+    if first_come:
+        priority = Priority.FIRST_TO_ARRIVE
+    else:
+        priority = Priority.FIRST if one_yields or other_yields else Priority.NONE
+    first, second = (other, one) if one_yields and priority is Priority.FIRST else (one, other)
+    merging = one.getToLane() is other.getToLane()
+    return Candidate(
+        kind=kind,
+        junction=one.getJunction().getID(),
+        first=LaneWay.of(first),
+        second=LaneWay.of(second),
+        place=lane_line(one.getToLane())[0] if merging else np.array(overlap.centroid.coords[0]),
+        priority=priority,
+        with_signals=bool(one.getTLSID() or other.getTLSID()),
+    )
 
 
 def foe_pairs(links: Sequence[Connection]) -> Iterator[tuple[Connection, Connection]]:
@@ -138,24 +132,6 @@ def foe_pairs(links: Sequence[Connection]) -> Iterator[tuple[Connection, Connect
     for one, other in combinations(links, 2):
         if other in foes[one] and one in foes[other]:
             yield one, other
-
-
-def in_order(one: Connection, other: Connection) -> tuple[Connection, Connection, Priority]:
-    """Two connections and their priority; if one of them has it, it is the first."""
-    one_yields, first_come = yields_to(one, other)
-    other_yields, _ = yields_to(other, one)
-    if first_come:
-        return one, other, Priority.FIRST_TO_ARRIVE
-    if not one_yields and not other_yields:
-        return one, other, Priority.NONE
-    return (other, one, Priority.FIRST) if one_yields else (one, other, Priority.FIRST)
-
-
-def place_of(one: Connection, other: Connection, overlap: BaseGeometry) -> FloatArray:
-    """[2] where two connections with a common area cross, or where the lane begins to which both lead."""
-    if one.getToLane() is other.getToLane():
-        return lane_line(one.getToLane())[0]
-    return np.array(overlap.centroid.coords[0])
 
 
 def candidates(net: Net) -> list[Candidate]:
@@ -195,18 +171,12 @@ def _at_junction(node: Node, feeders: Feeders, rings: set[str]) -> Iterator[Cand
         if kind is None or overlap is None:
             continue
         seen.add(key)
-        first, second, priority = in_order(one, other)
-        if priority is not Priority.FIRST and float(_out(one) @ _into(one)) < float(_out(other) @ _into(other)):
-            first, second = other, one  # of equal ones, the straighter way is the ego's
-        yield Candidate(
-            kind=kind,
-            junction=node.getID(),
-            first=LaneWay.of(first),
-            second=LaneWay.of(second),
-            place=place_of(one, other, overlap),
-            priority=priority,
-            with_signals=bool(one.getTLSID() or other.getTLSID()),
-        )
+        found = _conflict(kind, one, other, overlap)
+        straighter = float(_out(one) @ _into(one)) >= float(_out(other) @ _into(other))
+        if found.priority is Priority.FIRST or straighter:
+            yield found
+        else:  # of equal ones, the straighter way is the ego's
+            yield replace(found, first=LaneWay.of(other), second=LaneWay.of(one))
 
 
 def _kind(one: Connection, other: Connection, rings: set[str], arms: int) -> CandidateKind | None:

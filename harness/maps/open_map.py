@@ -1,13 +1,15 @@
-"""A map that was read: its net, and the games that can be made on it."""
+"""A map that was read: its net, the games that can be made on it, and the part of the net that a game needs."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import shutil
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from html import unescape
 from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
 from sumolib.net import Net
 
 from harness.errors import UsageError
@@ -16,7 +18,8 @@ from harness.game.junctions import SIGNALS, Signal
 from harness.maps.game_plans import GamePlan, Plans
 from harness.maps.import_map import import_map
 from harness.road.net.net_listing import ListedJunction, ListedLane, edges_near, listed_junctions, listed_lanes
-from harness.road.net.network import car_lanes, lane_line
+from harness.road.net.network import car_lanes, junctions_near, lane_line
+from harness.road.net.tiles import write_tiles
 from harness.road.xml.xml_file import number_of, parse_xml
 
 _STOPS = {letter for letter, signal in SIGNALS.items() if signal in (Signal.YELLOW, Signal.RED)}
@@ -99,3 +102,25 @@ def _longest_s(logic: ElementTree.Element) -> float:
             since_s = since_s + duration_s if stop else 0.0
             longest_s = max(longest_s, since_s)
     return longest_s
+
+
+def write_part(net: Net, net_file: Path, routes: Collection[str], file: Path) -> bool:
+    """Write the part of a net, which was read from `net_file`, that the games of a scene use: the junctions near the
+    edges `routes`, and their edges. Names and places stay. Returns whether anything was left out."""
+    junctions = junctions_near(net, {net.getEdge(name) for name in routes})
+    if junctions is None:
+        shutil.copyfile(net_file, file)
+        return False
+    write_tiles(net_file, file, prefixes=[""], offset_m=0.0, junctions=junctions)
+    root = parse_xml(file)
+    location = root.find("location")
+    if location is not None:
+        location.set("convBoundary", ",".join(f"{each:.2f}" for each in _boundary(root)))
+    ElementTree.ElementTree(root).write(file, encoding="utf-8", xml_declaration=True)
+    return True
+
+
+def _boundary(root: ElementTree.Element) -> list[float]:
+    shapes = [each.get("shape", "") for tag in ("lane", "junction") for each in root.iter(tag)]
+    points = np.array([point.split(",")[:2] for shape in shapes for point in shape.split()], dtype=float)
+    return [float(each) for each in (*points.min(axis=0), *points.max(axis=0))]

@@ -11,7 +11,7 @@ import pandas as pd
 
 from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles, PlacedObstacle
 from harness.road.demand.route_file import CAR_SIZE_M, SIZES_M
-from harness.road.demand.walker_vehicle import WALKER_ATTRIBUTES, WALKER_TYPE
+from harness.road.demand.walks import WALKER_ATTRIBUTES, WALKER_TYPE
 from harness.road.xml.xml_file import parse_xml
 
 PLAYER_COLOURS = {

@@ -23,7 +23,7 @@ from harness.game.geometry import Box
 from harness.game.sight import Hiding
 from harness.game.world import World
 from harness.reports.columns_page import columns_page
-from harness.road.demand.walker_vehicle import WALKER_TYPE
+from harness.road.demand.walks import WALKER_TYPE
 from harness.road.scene.open_scene import open_scene
 from tests.support.repository import REPOSITORY
 from tests.support.traces import along, game, rows

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from sumolib.net.connection import Connection
 
-from harness.maps.net_part import write_part
+from harness.maps.open_map import write_part
 from harness.road.net.net_file import check_net
 from harness.road.net.network import KEPT_M, lane_line, read_net
 from harness.road.net.right_of_way_table import foes_of

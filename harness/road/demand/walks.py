@@ -1,8 +1,9 @@
-"""Checks of persons' walks against the net: what SUMO 1.28 does not carry safely is found before a game.
+"""People on foot: the persons of a route file, whose walks are checked against the net, and the bodies of players.
 
-libsumo may die of a segmentation fault with persons in nets with crossings or walking areas. In nets without them SUMO
-moves a person over a junction along the connection of its lanes; without a connection, it moves the person from lane
-to lane at once, however far they are apart.
+libsumo 1.28 may die of a segmentation fault with persons in nets with crossings or walking areas. In nets without them
+SUMO moves a person over a junction along the connection of its lanes; without a connection, it moves the person from
+lane to lane at once, however far they are apart. Persons that are placed end SUMO in nets with crossings, too, and its
+cars do not see them beside crossings: a player on foot is a small vehicle with the shape of a pedestrian.
 """
 
 from __future__ import annotations
@@ -10,20 +11,35 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from xml.etree import ElementTree
 
 import numpy as np
+import shapely
 from sumolib.net import Net
 from sumolib.net.edge import Edge
 from sumolib.net.lane import Lane
 
-from harness.road.demand.route_file import PLACES, Departure
-from harness.road.net.network import lane_line
+from harness.config.road_user import WALKER_LENGTH_M, WALKER_RUN_MPS, WALKER_WIDTH_M
+from harness.config.scene import Scene
+from harness.game.arrays import FloatArray
+from harness.road.demand.route_file import PLACES, Departure, RouteFile, VehicleType
+from harness.road.net.network import car_lanes, lane_line
 from harness.road.xml.xml_file import number_of
 
 MOST_JUMP_M = 5.0
 """Our own: around the corner of a block a person may be moved this far at once, on its side of the roads."""
 _SHARES = {"base": 0.0, "center": 0.5, "max": 1.0}
 _UNSAFE = ("crossing", "walkingarea")
+WALKER_TYPE = "harness_pedestrian"
+WALKER_ATTRIBUTES = {
+    "id": WALKER_TYPE,
+    "length": f"{WALKER_LENGTH_M:g}",
+    "width": f"{WALKER_WIDTH_M:g}",
+    "maxSpeed": f"{WALKER_RUN_MPS:g}",
+    "minGap": "0.25",
+    "guiShape": "pedestrian",
+}
+"""The SUMO `<vType>` of a walker. Its class is a car's: the edges of its route need not allow pedestrians."""
 
 
 def unsafe_net(net: Net) -> tuple[str, str] | None:
@@ -96,3 +112,48 @@ def _jumps(lanes: Sequence[Lane], course: Sequence[bool]) -> Iterator[tuple[floa
             continue
         leaves, enters = lane_line(lane)[-1 if ahead else 0], lane_line(following)[0 if ahead_then else -1]
         yield float(np.hypot(*(enters - leaves))), k
+
+
+# --- the bodies of players -------------------------------------------------------------------------------------------
+
+
+def with_walkers(routes: RouteFile, document: Scene, net: Net) -> RouteFile:
+    """The route file with a vehicle for each pedestrian among the players, on the road that is nearest to its way."""
+    walkers = {
+        name: np.array(player.way)
+        for name, player in zip(document.vehicles, document.players, strict=True)
+        if player.way is not None
+    }
+    if not walkers:
+        return routes
+    types = ElementTree.fromstring(routes.types_xml)
+    ElementTree.SubElement(types, "vType", WALKER_ATTRIBUTES)
+    vehicles = {
+        name: Departure(
+            name=name,
+            vehicle_type=WALKER_TYPE,
+            edges=(_nearest_road(net, way).getID(),),
+            depart_s=0.0,
+            lane="best",
+        )
+        for name, way in walkers.items()
+    }
+    kind = VehicleType(
+        name=WALKER_TYPE,
+        length_m=WALKER_LENGTH_M,
+        width_m=WALKER_WIDTH_M,
+        max_speed_mps=WALKER_RUN_MPS,
+        vehicle_class="pedestrian",  # what it is; to SUMO it is a car
+    )
+    return replace(
+        routes,
+        types={**routes.types, WALKER_TYPE: kind},
+        vehicles={**routes.vehicles, **vehicles},
+        types_xml=ElementTree.tostring(types, encoding="unicode"),
+    )
+
+
+def _nearest_road(net: Net, way: FloatArray) -> Edge:
+    roads = [edge for edge in net.getEdges(withInternal=False) if car_lanes(edge)]
+    line = shapely.LineString(way)
+    return min(roads, key=lambda edge: shapely.distance(line, shapely.LineString(lane_line(car_lanes(edge)[0]))))

@@ -17,7 +17,7 @@ from harness.files import leads_out
 from harness.road.demand.route_file import RouteFile
 from harness.road.demand.route_reading import read_route_file
 from harness.road.demand.trips import with_routes
-from harness.road.demand.walker_vehicle import with_walkers
+from harness.road.demand.walks import with_walkers
 from harness.road.net import network
 from harness.road.net.net_file import check_net
 
