@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 from pathlib import Path
 
+import platformdirs
 import pytest
 from sumolib.net import readNet
 
@@ -49,7 +50,7 @@ def test_gzip__that_unpacks_to_too_much_is_refused(tmp_path: Path) -> None:
 def test_gzip__a_net_is_checked_read_tiled_and_replayed(
     tmp_path: Path, merge: OpenScene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(tiles.platformdirs, "user_cache_dir", lambda name: str(tmp_path / name))
+    monkeypatch.setattr(platformdirs, "user_cache_dir", lambda name: str(tmp_path / name))
     net = packed(tmp_path, gzip.compress(merge.net_file.read_bytes()))
     check_net(net)
     assert [edge.getID() for edge in read_net(net).getEdges(withInternal=False)] == ["approach", "exit"]

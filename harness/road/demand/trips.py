@@ -8,8 +8,6 @@ The routes are cached by the content of the net, the trips and SUMO's version.
 
 from __future__ import annotations
 
-import hashlib
-import importlib.metadata
 import json
 import tempfile
 from collections.abc import Iterable, Sequence
@@ -18,7 +16,6 @@ from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree
 
-import platformdirs
 from sumolib.net import Net
 
 from harness.errors import Problem, UsageError, collect
@@ -27,7 +24,7 @@ from harness.road.demand.route_file import Departure, RouteFile, VehicleType
 from harness.road.demand.stops import placed
 from harness.road.demand.walks import with_places_in_metres
 from harness.road.net import network
-from harness.road.xml.sumo_program import run_program
+from harness.road.xml.sumo_program import cached_file, run_program
 from harness.road.xml.xml_file import parse_xml
 
 PATIENCE_S, PATIENCE_S_PER_BYTE = 60.0, 4e-6  # time limit: a constant, and a part per byte of the net
@@ -106,15 +103,10 @@ def _find(
 
 
 def _answers(net_file: Path, route_path: Path, queries: Sequence[_Query]) -> dict[_Query, tuple[str, ...]]:
-    version = importlib.metadata.version("eclipse-sumo")
-    content = net_file.read_bytes() + json.dumps([version, queries]).encode()
-    cache = Path(platformdirs.user_cache_dir("harness")) / "trips" / f"{hashlib.sha256(content).hexdigest()[:24]}.json"
-    if cache.exists():
-        edges: list[list[str]] = json.loads(cache.read_text(encoding="utf-8"))
-    else:
-        edges = _run_duarouter(net_file.resolve(), route_path, queries)
-        cache.parent.mkdir(parents=True, exist_ok=True)
-        write_atomically(cache, json.dumps(edges).encode())
+    def write(file: Path) -> None:
+        write_atomically(file, json.dumps(_run_duarouter(net_file.resolve(), route_path, queries)).encode())
+
+    edges = json.loads(cached_file("trips/.json", net_file, queries, write).read_text(encoding="utf-8"))
     return {query: tuple(route) for query, route in zip(queries, edges, strict=True) if route}
 
 

@@ -9,8 +9,6 @@ rest of its walk. The snapshots are the same in training and in assessment, and 
 
 from __future__ import annotations
 
-import hashlib
-import importlib.metadata
 import logging
 import os
 import tempfile
@@ -21,7 +19,6 @@ from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree
 
-import platformdirs
 from pydantic import TypeAdapter
 
 from harness.config.scene import Scene
@@ -30,7 +27,7 @@ from harness.files import write_atomically
 from harness.game.seeding import between, generator_of, seed_of
 from harness.road.demand.route_file import Departure, Motion, RouteFile, traveller_element
 from harness.road.xml.angles import heading_rad_of
-from harness.road.xml.sumo_program import run_program
+from harness.road.xml.sumo_program import cached_file, run_program
 from harness.road.xml.xml_file import parse_xml
 
 SNAPSHOTS = 20
@@ -56,23 +53,22 @@ def snapshots(document: Scene, routes: RouteFile, net_file: Path) -> tuple[Snaps
     """The snapshots of a scene, from the cache if it has them. Raises SimulationError if SUMO fails."""
     players = set(document.vehicles)
     drawn = [_drawn(document, routes, players, k) for k in range(SNAPSHOTS)]
-    version = importlib.metadata.version("eclipse-sumo")
     options = _options(document)
-    key = net_file.read_bytes() + repr((version, options, routes.types_xml, drawn)).encode()
-    cache = Path(platformdirs.user_cache_dir("harness")) / "warm-up" / f"{hashlib.sha256(key).hexdigest()[:24]}.json"
-    if cache.exists():
-        return _CONTENT.validate_json(cache.read_bytes())
-    done: list[Snapshot] = []
-    run = partial(_run, routes=routes, net_file=net_file.resolve(), options=options)
-    with ThreadPoolExecutor(os.cpu_count() or 1) as threads:
-        vehicles = threads.map(run, (departures for _, departures in drawn), range(SNAPSHOTS))
-        for (density, _), on_road in zip(drawn, vehicles, strict=True):
-            done.append(Snapshot(density=density, vehicles=tuple(on_road)))
-            extra = {"done": len(done), "total": SNAPSHOTS}
-            _LOGGER.info("warming up the background traffic, once per scene", extra=extra)
-    cache.parent.mkdir(parents=True, exist_ok=True)
-    write_atomically(cache, _CONTENT.dump_json(tuple(done)))
-    return tuple(done)
+
+    def write(file: Path) -> None:
+        done: list[Snapshot] = []
+        run = partial(_run, routes=routes, net_file=net_file.resolve(), options=options)
+        with ThreadPoolExecutor(os.cpu_count() or 1) as threads:
+            vehicles = threads.map(run, (departures for _, departures in drawn), range(SNAPSHOTS))
+            for (density, _), on_road in zip(drawn, vehicles, strict=True):
+                done.append(Snapshot(density=density, vehicles=tuple(on_road)))
+                extra = {"done": len(done), "total": SNAPSHOTS}
+                _LOGGER.info("warming up the background traffic, once per scene", extra=extra)
+        write_atomically(file, _CONTENT.dump_json(tuple(done)))
+
+    return _CONTENT.validate_json(
+        cached_file("warm-up/.json", net_file, (options, routes.types_xml, drawn), write).read_bytes()
+    )
 
 
 def _drawn(document: Scene, routes: RouteFile, players: set[str], k: int) -> tuple[float, list[Departure]]:

@@ -5,18 +5,14 @@ The tiled net is cached by the net's content, the number of games, the junctions
 
 from __future__ import annotations
 
-import hashlib
 import logging
-import os
-import tempfile
 from collections.abc import Callable, Collection, Iterator
 from decimal import Decimal
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.sax.saxutils import quoteattr
 
-import platformdirs
-
+from harness.road.xml.sumo_program import cached_file
 from harness.road.xml.xml_file import parse_xml
 
 _ORDER = ("type", "edge", "tlLogic", "junction", "connection", "roundabout")  # as SUMO reads them
@@ -160,17 +156,11 @@ def tiled_net(net_file: Path, games: int, junctions: Collection[str] | None = No
     """
     if games == 1 and junctions is None:
         return net_file
-    kept = "all" if junctions is None else "\n".join(sorted(junctions))
-    key = f"{games} {_GAP_M} {_FORMAT} {kept}".encode()
-    digest = hashlib.sha256(net_file.read_bytes() + key).hexdigest()[:24]
-    cache = Path(platformdirs.user_cache_dir("harness")) / "tiles"
-    cache.mkdir(parents=True, exist_ok=True)
-    merged = cache / f"{digest}.net.xml"
-    if not merged.exists():
+
+    def write(file: Path) -> None:
         _LOGGER.info("copying the network %d times, once per scene", games, extra={"done": 0, "total": games + 1})
-        with tempfile.TemporaryDirectory(dir=cache) as scratch:
-            copies, prefixes = Path(scratch) / "tiles.net.xml", [tile_prefix(game, games) for game in range(games)]
-            offset_m = tile_offset_m(net_file, games)
-            write_tiles(net_file, copies, prefixes=prefixes, offset_m=offset_m, junctions=junctions)
-            os.replace(copies, merged)
-    return merged
+        prefixes = [tile_prefix(game, games) for game in range(games)]
+        write_tiles(net_file, file, prefixes=prefixes, offset_m=tile_offset_m(net_file, games), junctions=junctions)
+
+    key = (games, _GAP_M, _FORMAT, None if junctions is None else sorted(junctions))
+    return cached_file("tiles/.net.xml", net_file, key, write)

@@ -1,12 +1,16 @@
-"""Running a program of SUMO in a process of its own."""
+"""Running a program of SUMO in a process of its own, and the cache of what is made once for a net."""
 
 from __future__ import annotations
 
+import hashlib
+import importlib.metadata
 import os
 import subprocess
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import platformdirs
 import sumo
 
 
@@ -29,3 +33,20 @@ def run_program(
         )
     except subprocess.TimeoutExpired:
         return None
+
+
+def cached_file(name: str, net_file: Path, key: object, write: Callable[[Path], None]) -> Path:
+    """A file of the cache for the content of a net, a key and SUMO's version, which `write` makes if it is not there.
+
+    `name` has the folder and the ending of the file: `tiles/.net.xml`.
+    """
+    version = importlib.metadata.version("eclipse-sumo")
+    digest = hashlib.sha256(net_file.read_bytes() + repr((version, key)).encode()).hexdigest()[:24]
+    folder, _, ending = name.partition("/")
+    file = Path(platformdirs.user_cache_dir("harness")) / folder / f"{digest}{ending}"
+    if not file.exists():
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=file.parent) as scratch:
+            write(Path(scratch) / file.name)
+            os.replace(Path(scratch) / file.name, file)
+    return file
