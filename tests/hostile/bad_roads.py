@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tests.hostile.inputs import NET, ROUTES, Bad, changed, edit, moved_out, put, recode, several, whole_file
+from tests.hostile.inputs import NET, ROUTES, SCENE, Bad, changed, edit, moved_out, put, recode, several, whole_file
 
 HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
 BOMB = "<!DOCTYPE r [<!ENTITY a0 'ha'>" + "".join(f"<!ENTITY a{k} '{f'&a{k - 1};' * 10}'>" for k in range(1, 12)) + "]>"
@@ -242,5 +242,6 @@ ROUTE_FILES = [
         ("a flow from nowhere", END, '<flow id="more" to="exit" period="5"/></routes>', ("flow more", "'from'")),
     ),
     Bad("merge.rou.xml: another that may not use the road", several(edit(ROUTES, END, other("").replace("person_car", "boat").replace("<vehicle", '<vType id="boat" vClass="ship"/><vehicle')), edit(NET, LANE, LANE.replace("index=", 'allow="passenger" index=')), edit(NET, '"approach_0" index', '"approach_0" allow="passenger" index')), ("merge.rou.xml", "SUMO can't load it", "'other'")),
+    Bad("merge.rou.xml: another with the name of a role", several(edit(ROUTES, 'vehicle id="ego"', 'vehicle id="hero"'), edit(ROUTES, END, other("").replace('"other"', '"ego"')), edit(SCENE, 'vehicle = "ego"', 'vehicle = "hero"')), ("merge.rou.xml", "vehicle ego", "has the name of a player", "rename it")),
     Bad("merge.rou.xml: nobody at all", put(ROUTES, HEAD + "<routes/>"), ("scene.toml", "ego.vehicle", "no vehicle")),
 ]

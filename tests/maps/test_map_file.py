@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from harness.errors import UsageError
-from harness.maps import map_file
 from harness.maps.map_file import MapKind, facts_of, kind_of
 from tests.support.repository import REPOSITORY
 
@@ -107,22 +106,6 @@ def test_facts__500_mb_are_refused_by_their_size_before_they_are_read(tmp_path: 
         sparse.truncate(500_000_000)
     with pytest.raises(UsageError, match=r"too large: 500 MB, at most 100 MB.*osmium extract"):
         facts_of(file, MapKind.OSM)
-
-
-def test_facts__a_compressed_file_is_read_up_to_its_limit_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(map_file, "MOST_BYTES", 3_000_000)
-    packed = tmp_path / "bomb.osm.gz"
-    packed.write_bytes(gzip.compress(osm("<!-- " + " " * 4_000_000 + " -->").encode()))
-    with pytest.raises(UsageError, match=r"holds more than 3 MB.*osmium extract"):
-        facts_of(packed, MapKind.OSM)
-
-
-@pytest.mark.parametrize(("content", "message"), [(b"no gzip", "is not a gzip file"), (None, "is cut off")])
-def test_facts__of_a_broken_compressed_file(content: bytes | None, message: str, tmp_path: Path) -> None:
-    packed = tmp_path / "broken.osm.gz"
-    packed.write_bytes(content or gzip.compress((MAPS / "town.osm").read_bytes())[:-20])
-    with pytest.raises(UsageError, match=message):
-        facts_of(packed, MapKind.OSM)
 
 
 def test_facts__of_a_file_that_is_not_there(tmp_path: Path) -> None:

@@ -1,4 +1,5 @@
-"""Players on foot and on bicycles in a scene: their ways, their surface, their conflicts, and what is refused."""
+"""Players on foot and on bicycles in a scene: their ways, their surface, their conflicts, the stripes of
+marked crossings, and what is refused."""
 
 from __future__ import annotations
 
@@ -8,11 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 
 from harness.config.road_user import WALKING_MPS
 from harness.errors import UsageError
 from harness.game.junctions import Control
 from harness.road.net.network import read_net
+from harness.road.net.walker_conflicts import stripes
 from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.repository import REPOSITORY
 
@@ -187,3 +190,23 @@ def test_bicycle__on_a_route_that_forbids_bicycles_is_refused(tmp_path: Path) ->
     forbid = ("cyclist.net.xml", 'id="east_out_0" index="0" allow="bicycle"', 'id="east_out_0" index="0" allow="bus"')
     text = problem(changed(tmp_path, "cyclist", forbid))
     assert "vehicle non_ego: its route passes edge 'east_out', which forbids bicycles" in text
+
+
+ROAD = shapely.box(0.0, 0.0, 100.0, 7.0)
+
+
+def test_stripes__cover_every_other_half_metre_of_the_carriageway() -> None:
+    corners = np.array(list(stripes([np.array([[50.0, -5.0], [50.0, 12.0]])], ROAD)))
+    middles = corners[:, :4].mean(axis=1)
+    assert middles[:, 0] == pytest.approx(50.0)
+    assert middles[:, 1] == pytest.approx([0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5])
+    assert np.ptp(corners, axis=1) == pytest.approx(np.array([[4.0, 0.5]] * 7))  # along the road, along the way
+
+
+def test_stripes__way_beside_the_road_has_none() -> None:
+    assert not list(stripes([np.array([[10.0, 9.0], [90.0, 9.0]])], ROAD))
+
+
+def test_shipped_scenes__only_the_zebra_is_striped(crossing: OpenScene) -> None:
+    assert len(open_scene(NETWORKS / "zebra").stripes) == 7
+    assert not crossing.stripes

@@ -17,9 +17,12 @@ from sumolib.net import Net
 
 from harness.game.geometry import Box, box_distance
 from harness.game.junctions import SAMPLE, Conflicts, Control, RightOfWay
+from harness.game.roles import EGO, NON_EGO
 from harness.road.net import network
 from harness.road.net.right_of_way_table import right_of_way
 from harness.road.net.stream import Feeders, Stream, carries_traffic
+from harness.road.scene.open_scene import open_scene
+from tests.support.repository import REPOSITORY
 from tests.support.roads import roundabout_sources
 
 Build = Callable[..., Path]
@@ -276,3 +279,16 @@ def car_at(line: shapely.LineString, place_m: float) -> Box:
     rear, front = (line.interpolate(min(max(place_m + reach, 0.0), line.length)) for reach in (-1.4, 1.4))
     heading_rad = float(np.arctan2(front.y - rear.y, front.x - rear.x))
     return Box((front.x + rear.x) / 2.0, (front.y + rear.y) / 2.0, heading_rad, 4.6, 1.8)
+
+
+@pytest.mark.parametrize("name", ["left_across", "priority_crossing", "roundabout", "red_light"])
+def test_junction__the_ego_has_priority_over_the_person_or_a_signal_decides(name: str) -> None:
+    right_of_way = open_scene(REPOSITORY / "networks" / name).world.right_of_way
+    conflicts, lines = right_of_way.conflicts, right_of_way.stop_lines
+    assert {EGO, NON_EGO} <= set(conflicts.player.tolist())
+    signals = {"left_across", "red_light"}
+    assert (Control.SIGNAL in set(lines.control.tolist())) == (name in signals)
+    assert bool(right_of_way.signal_links) == (name in signals)
+    if name == "priority_crossing":
+        assert not conflicts.yields[conflicts.player == EGO].any()
+        assert conflicts.yields[conflicts.player == NON_EGO].any()

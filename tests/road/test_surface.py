@@ -10,7 +10,6 @@ from harness.road.net import surface
 from harness.road.net.surface import Part
 
 SQUARE = shapely.box(0.0, 0.0, 20.0, 20.0)
-LINE = np.array([[0.0, 10.0], [20.0, 10.0]])
 
 
 def beside(gap_m: float) -> shapely.MultiPolygon:
@@ -28,11 +27,6 @@ def test_slits__holes_thinner_than_a_metre_are_closed(width_m: float, holes: int
     assert len(area.interiors) == holes
 
 
-def test_slits__an_area_without_any_stays_as_it_is() -> None:
-    corner = SQUARE.difference(shapely.box(10.0, 10.0, 30.0, 30.0))
-    assert surface.without_slits(corner) is corner
-
-
 def road(x_from: float, x_to: float, height_m: float, own: bool) -> Part:
     """A road along x, 6 m wide, whose height begins at 0 and ends at `height_m`."""
     line = np.array([[x_from, 0.0, 0.0], [0.5 * (x_from + x_to), 0.0, height_m], [x_to, 0.0, height_m]])
@@ -47,11 +41,6 @@ def test_levels__only_the_overlap_that_differs_in_height_is_cut() -> None:
     _, kept = surface.own_level([own, ramp])
     assert kept.shape.intersects(shapely.Point(4.0, 3.0))  # where it leaves
     assert not kept.shape.intersects(shapely.Point(120.0, 0.0))  # where it crosses
-
-
-def test_swept__a_lane_that_is_wide_enough_adds_nothing() -> None:
-    area = surface.lane_shape(LINE, 3.2)
-    assert surface.with_swept_paths(area, [LINE]) is area
 
 
 def test_swept__a_car_that_follows_a_sharp_bend_stays_inside() -> None:
