@@ -12,7 +12,6 @@ from harness.game.bicycle import (
     ActuatorLimits,
     Requested,
     actions,
-    curvature_per_m,
     lateral_acceleration_mps2,
     move,
     requests,
@@ -63,18 +62,6 @@ def test_drive__one_step_of_a_turn_agrees_with_a_hand_calculation() -> None:
     assert state.y_m[0, 0] == pytest.approx(np.sin(0.36868252), abs=1e-7)
     assert state.speed_mps[0, 0] == 10.0
     assert lateral_acceleration_mps2(state, actuators())[0, 0] == pytest.approx(3.711437, abs=1e-5)
-
-
-def test_drive__a_full_circle_has_the_radius_of_its_curvature() -> None:
-    state = state_of(5.0, steering_rad=0.3)
-    radius = 1.0 / float(curvature_per_m(np.array(0.3), np.array(2.7)))
-    steps = round(2.0 * np.pi * radius / (5.0 * STEP_S))
-    points = []
-    for _ in range(steps):
-        advance(state, 0.0, 0.3)
-        points.append((state.x_m[0, 0], state.y_m[0, 0]))
-    centre = np.mean(points, axis=0)
-    assert np.hypot(*(np.array(points) - centre).T) == pytest.approx(radius, rel=0.02)
 
 
 def test_drive__on_ice_the_grip_is_that_of_the_game() -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -15,17 +13,7 @@ from harness.game.payoff import FuzzyFunction, FuzzySet
 LEGAL = FuzzySet(name="legal", inputs=(0.0, 0.1), memberships=(1.0, 0.0), value=0.0)
 THRILLING = FuzzySet(name="thrilling", inputs=(0.0, 0.1, 0.3, 0.5), memberships=(0.0, 1.0, 1.0, 0.0), value=2.0)
 FRIGHTENING = FuzzySet(name="frightening", inputs=(0.3, 0.5), memberships=(0.0, 1.0), value=-4.0)
-EVERYTHING = FuzzySet(name="everything", inputs=(0.0,), memberships=(1.0,), value=0.0)
 SPEEDY = FuzzyFunction("speed_over_limit", (LEGAL, THRILLING, FRIGHTENING))
-
-
-@pytest.mark.parametrize(
-    ("value", "membership"), [(-0.5, 0.0), (0.0, 0.0), (0.025, 0.25), (0.1, 1.0), (0.2, 1.0), (0.45, 0.25), (9.0, 0.0)]
-)
-def test_membership__is_linear_between_points_and_constant_outside(value: float, membership: float) -> None:
-    # with a second set of value 0 and membership 1 everywhere, the output is membership / (membership + 1)
-    function = FuzzyFunction("q", (replace(THRILLING, value=1.0), EVERYTHING))
-    assert function(np.array([value])) == pytest.approx([membership / (membership + 1.0)])
 
 
 @pytest.mark.parametrize(

@@ -14,12 +14,10 @@ from harness.environments.arena import Arena, Seat
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.human_factors import (
     NO_LIMITS,
-    ActuatorShares,
     Attention,
     HumanFactors,
     Lapses,
     Limits,
-    PlayersLimits,
     Reaction,
     Sight,
     draw_estimation_errors,
@@ -28,7 +26,6 @@ from harness.game.human_factors import (
 )
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.observation_layout import LAYOUT, in_units
-from harness.game.state import State
 from harness.game.world import World
 from harness.road.scene.open_scene import OpenScene
 from tests.support.moments import Moment, car, seen
@@ -65,19 +62,6 @@ def played(arena: Arena, starts: dict[int, InitialState], actions: FloatArray) -
 
 
 # --- reaction ---------------------------------------------------------------------------------------------------------
-
-
-def test_delay__decisions_arrive_late_and_until_then_the_car_coasts() -> None:
-    limits = PlayersLimits(games=2, players=2, steps=10)
-    state = State.empty(2, 2)
-    limits.reset(0, 0, Limits(delay_steps=2), state)
-    for step in range(6):
-        decided = np.full((2, 2, 2), 0.1 * (step + 1))
-        arriving = limits.arriving(decided, np.array([step, step]))
-        late = [0.0, 0.0, 0.1, 0.2, 0.3, 0.4][step]
-        assert arriving[0, 0] == pytest.approx([late, late])
-        assert (arriving[0, 1] == decided[0, 1]).all()  # the player without delay
-        assert (arriving[1] == decided[1]).all()
 
 
 def test_delay__the_car_follows_earlier_decisions(arena: Arena, straight: OpenScene) -> None:
@@ -219,34 +203,10 @@ def test_actuator_shares__limit_the_car(arena: Arena, straight: OpenScene) -> No
 
 # --- independent draws ------------------------------------------------------------------------------------------------
 
-BODY = HumanFactors(
-    reaction=Reaction(delay_s=(0.2, 0.9)),
-    sight=Sight(
-        looked_but_failed_to_see_share=0.5,
-        noticed_within_m=8.0,
-        range_m=60.0,
-        distance_error=0.1,
-        closing_error_per_s=0.01,
-    ),
-    actuator_shares=ActuatorShares(throttle_share=0.8, braking_share=0.7, steering_share=0.6),
-)
-
 
 def test_start__without_limits_has_none(straight: OpenScene) -> None:
     assert all(each is NO_LIMITS for each in drawn(straight, 1).limits)
     assert body_limits(straight, HumanFactors(sight=Sight()), 1) == [NO_LIMITS]
-
-
-def test_start__each_limit_is_drawn_independently(straight: OpenScene) -> None:
-    everything, late, inexact = (
-        body_limits(straight, each, 1)[0]
-        for each in (BODY, HumanFactors(reaction=BODY.reaction), HumanFactors(sight=BODY.sight))
-    )
-    assert everything.delay_steps == late.delay_steps
-    assert late.estimation_errors is None
-    assert everything.estimation_errors is not None
-    assert (everything.estimation_errors == inexact.estimation_errors).all()
-    assert everything.sight_m in (8.0, 60.0)
 
 
 @settings(max_examples=25, deadline=None)

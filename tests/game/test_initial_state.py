@@ -58,6 +58,7 @@ def test_start__is_paired_for_all_human_factors(start_distribution: StartDistrib
     """What differs in one player changes no draw of another, and no draw of its own that has other parts."""
     late = replace(TEXTING, reaction=Reaction(delay_s=(0.2, 0.9)), sight=Sight(distance_error=0.1))
     own, other = (replace(start_distribution, human_factors=([TEXTING], [each])) for each in (HumanFactors(), late))
+    slow = replace(start_distribution, human_factors=([TEXTING], [HumanFactors(reaction=late.reaction)]))
     for episode in range(5):
         one = draw_initial_state(own, "a", episode)
         two = draw_initial_state(replace(other, present_share=(1.0, 0.0)), "a", episode)
@@ -67,6 +68,7 @@ def test_start__is_paired_for_all_human_factors(start_distribution: StartDistrib
         assert not one.lapses[1].lapsed.any()
         assert two.lapses[1].lapsed.any()
         assert two.limits[1].delay_steps > 0 == one.limits[1].delay_steps
+        assert two.limits[1].delay_steps == draw_initial_state(slow, "a", episode).limits[1].delay_steps
         assert two.present.tolist() == [True, False]
 
 

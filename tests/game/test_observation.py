@@ -123,13 +123,6 @@ def test_observation__is_finite_and_within_bounds_for_all_states(
             assert not entries[0, p].any()
 
 
-def test_observation__of_an_absent_player_is_zeros(moment: Moment, world: World) -> None:
-    q = moment(world, [car(40.0), car(44.0, -4.8, present=False)])
-    assert not observe(q)[0, 1].any()
-    assert seen(q)["other0_seen"] == 0.0
-    assert seen(q)["free_right_m@0m"] == pytest.approx(-4.8 / 8.0, abs=2e-3)
-
-
 @pytest.mark.parametrize(("y", "side", "free"), [(-4.8, "right", -2.3), (-1.6, "left", 2.3)])
 def test_free_width__is_narrowed_by_a_car_alongside_on_its_side(
     moment: Moment, world: World, y: float, side: str, free: float

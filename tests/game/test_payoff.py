@@ -208,14 +208,6 @@ def test_document__becomes_equation_1(read: Callable[[str], Persona]) -> None:
     )
 
 
-def test_document__of_every_persona_has_finite_payoffs(repository: Path, moment: Moment, world: World) -> None:
-    files = sorted((repository / "personas").glob("*.toml"))
-    assert files
-    q = moment(world, [car(50.0), car(60.0, -4.8)])
-    for file in files:
-        assert np.isfinite(read_document(file, Persona).payoff.total(q, 0)).all()
-
-
 def test_document__without_terms_is_refused(read: Callable[[str], Persona]) -> None:
     with pytest.raises(UsageError, match="nothing could be learned from it"):
         read("[safety]\nweight = 1.0\n")

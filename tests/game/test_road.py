@@ -24,16 +24,6 @@ def locate(routes: Routes, points: list[tuple[float, float]], before: list[float
     return station[0], offset[0]
 
 
-@pytest.mark.parametrize("heading", [0.0, 0.7, np.pi / 2, -2.5])
-def test_locate__on_a_straight_road(heading: float) -> None:
-    # 31.37 m along, 1.2 m to the left
-    x = 31.37 * np.cos(heading) - 1.2 * np.sin(heading)
-    y = 31.37 * np.sin(heading) + 1.2 * np.cos(heading)
-    station, offset = locate(Routes.of([straight(heading)]), [(x, y)], [29.0])
-    assert station[0] == pytest.approx(31.37, abs=1e-9)
-    assert offset[0] == pytest.approx(1.2, abs=1e-9)
-
-
 @settings(max_examples=100, deadline=None)
 @given(
     radius=st.sampled_from([8.0, -8.0, 12.0, 25.0, -60.0, 300.0]),

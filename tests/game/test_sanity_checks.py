@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shutil
-from itertools import count
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -20,7 +19,6 @@ from harness.campaign.execution.stage_run import StageRun, run_context_of
 from harness.campaign.plan.plan import plan
 from harness.campaign.preflight import open_campaign
 from harness.campaign.storage.run_folder import RunFolder
-from harness.drivers.mixture import mixture_of
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import read_sumo_players
 from harness.errors import StageFailed, UsageError
@@ -41,7 +39,6 @@ from harness.sumo.libsumo_simulation import LibsumoSimulation
 from tests.support.rollouts import Steady, arm, play, records
 from tests.support.scenes import build_scene
 from tests.support.tiny import MERGE, write_campaign
-from tests.support.trainings import beside, in_one_go, naive_ego
 
 STEP = 5  # the step with a fault
 
@@ -95,21 +92,6 @@ def test_driver__that_misbehaves_is_an_error_row_with_driver_and_step(merge: Ope
         pattern = rf"ImpossibleNumber: the driver of non_ego, Misbehaving, decided .* in step {STEP}\b"
         assert re.match(pattern, game.record["error"]), game.record["error"]
         assert game.trace is None
-
-
-def test_opponent__that_misbehaves_ends_a_training_with_driver_and_step(merge: OpenScene, tmp_path: Path) -> None:
-    class AfterAWhile(Steady):
-        calls = count(1)
-
-        def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> Any:
-            steady = super().decide(games, observation, noise)
-            return "left" if next(self.calls) == STEP else steady
-
-    expected = rf"the driver of non_ego, AfterAWhile, decided .* in step {STEP} of game \d, in a demonstration"
-    spec = naive_ego(merge)
-    with pytest.raises(FloatingPointError, match=expected):
-        in_one_go(beside(spec, EGO, mixture_of(AfterAWhile(), spec.persona), alone_share=0.0), tmp_path)
-    assert not (tmp_path / "checkpoint.safetensors").exists()
 
 
 def test_driver__may_decide_the_bounds(merge: OpenScene) -> None:

@@ -13,7 +13,6 @@ import pytest
 
 from harness.game.junctions import NO_JUNCTIONS, Control, Signal, StopLines
 from harness.game.quantities import Quantities
-from harness.game.traffic_rules import since_change_s
 from harness.game.world import World
 from harness.road.scene.open_scene import OpenScene
 from tests.support.conflicts import CROSSING, with_conflicts
@@ -312,9 +311,3 @@ def test_wrong_way__is_beyond_the_mark_to_the_oncoming_lanes(
 
 
 # --- time since a signal changed -------------------------------------------------------------------------------------
-
-
-def test_since_change__counts_up_until_the_signal_changes() -> None:
-    red, green = int(Signal.RED), int(Signal.GREEN)
-    before, now = np.array([[red, red, green]]), np.array([[red, green, green]])
-    assert since_change_s(before, now, np.array([[4.0, 7.0, 0.0]]), 0.1)[0] == pytest.approx([4.1, 0.0, 0.1])

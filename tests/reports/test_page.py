@@ -353,14 +353,6 @@ def test_page__every_figure_says_what_it_shows(page):
     assert [tag for tag, _ in page.tags].count("figcaption") == len(figures)
 
 
-def test_page__figures_take_their_colours_from_the_page(html):
-    figures = "".join(re.findall(r"<svg.*?</svg>", html, flags=re.DOTALL))
-    assert "currentColor" in figures
-    assert "var(--persona)" in figures
-    assert not re.findall(r"#[0-9a-f]{6}\b", figures)
-    assert "<text" in figures
-
-
 def test_page__every_table_has_a_caption_and_scoped_headings(html, page):
     assert html.count("<table") == html.count("<caption>")
     assert all("scope" in attributes for tag, attributes in page.tags if tag == "th")

@@ -86,35 +86,6 @@ def test_reading__a_vehicle_that_sumo_has_lost_is_an_error(tmp_path: Path) -> No
         simulation.close()
 
 
-def test_reading__is_direct_after_a_player_was_removed_and_a_game_reset(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """SUMO's number of vehicles is the expected one."""
-    ways: list[bool] = []
-    read_near = background_traffic.read_near
-    monkeypatch.setattr(
-        background_traffic,
-        "read_near",
-        lambda *arguments, **options: ways.append(options["direct"]) or read_near(*arguments, **options),
-    )
-    scene = build_scene(tmp_path, others=OTHERS)
-    simulation, start = (
-        LibsumoSimulation(scene, 1, (True, True), 1),
-        placed(scene, (40, LEFT_Y, 0, 0), (20, LEFT_Y, 0, 0)),
-    )
-    try:
-        for vans in ([van("first", 60)], [van("second", 60), van("late", 5, 0.3)]):
-            simulation.reset(0, start, vans)
-            for _ in range(5):
-                simulation.step(start.x_m[None], start.y_m[None], start.heading_rad[None])
-        simulation.remove(0, 1)
-        reading = simulation.step(start.x_m[None], start.y_m[None], start.heading_rad[None])
-    finally:
-        simulation.close()
-    assert reading.names.tolist() == [["second", "late"]]
-    assert ways == [DIRECT] * 11
-
-
 def test_distance__is_that_to_the_nearest_player_that_is_present() -> None:
     x_m, present = (
         np.array([[0.0, 70.0], [0.0, 70.0], [0.0, 70.0]]),
