@@ -14,7 +14,6 @@ from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.errors import UsageError
 from harness.game.outcome import Outcome
-from harness.game.payoff import FuzzyFunction, FuzzySet, Payoff, Weighted
 from harness.game.payoff_terms import TERMS
 from harness.game.quantities import Quantities
 from harness.game.world import World
@@ -137,43 +136,6 @@ def test_terms__only_goal_and_progress_are_positive(moment: Moment, world: World
                     assert value_of(q, name, limits[term.parameter]) <= 0.0
 
 
-# --- equation 1 ------------------------------------------------------------------------------------------------------
-
-
-THRILL = FuzzyFunction(
-    "speed_over_limit", (FuzzySet(name="fast", inputs=(0.0, 0.2), memberships=(0.0, 1.0), value=6.0),)
-)
-
-
-def test_payoff__is_equation_1(moment: Moment, world: World) -> None:
-    payoff = Payoff(
-        alpha={"safety": 0.5, "operational": 2.0, "human": 3.0},
-        terms=(
-            Weighted(name="collision", weight=10.0),
-            Weighted(name="clearance", weight=2.0, parameter=1.4),
-            Weighted(name="goal", weight=5.0),
-            Weighted(name="progress", weight=4.0),
-            Weighted(name="time_pressure", weight=0.25),
-        ),
-        fuzzy={"thrill": (0.5, THRILL)},
-    )
-    q = moment(world, [car(50.0, speed_mps=1.1 * 13.89), FAR])
-    q.advanced_m = np.array([[1.5, 0.0]])
-    shares = {name: float(value[0]) for name, value in payoff.evaluate(q, 0).items()}
-    assert shares == pytest.approx(
-        {
-            "collision": 0.0,
-            "clearance": 0.5 * 2.0 * -0.5 * 0.1,  # a0 * weight * rate * step
-            "goal": 0.0,
-            "progress": 2.0 * 4.0 * 0.015,  # a1 * weight * way / 100 m
-            "time_pressure": 3.0 * 0.25 * -1.0 * 0.1,  # a2 * weight * rate * step
-            "thrill": 3.0 * 0.5 * 6.0 * 0.1,  # a2 * weight * (the average of one set is its value) * step
-        },
-        abs=2e-4,
-    )
-    assert payoff.total(q, 0)[0] == pytest.approx(sum(shares.values()))
-
-
 # --- from a document -------------------------------------------------------------------------------------------------
 
 
@@ -189,23 +151,28 @@ def read(tmp_path: Path) -> Callable[[str], Persona]:
     return from_text
 
 
-def test_document__becomes_equation_1(read: Callable[[str], Persona]) -> None:
+def test_document__is_evaluated_by_equation_1(read: Callable[[str], Persona], moment: Moment, world: World) -> None:
     persona = read(
         "[safety]\nweight = 0.5\n[safety.terms]\ncollision = 10\nclearance = { weight = 2.0, within_m = 1.4 }\n"
-        "[operational.terms]\ngoal = 5.0\n[human]\nweight = 3.0\n[human.terms]\ntime_pressure = 0.25\n"
+        "[operational.terms]\ngoal = 5.0\nprogress = 4.0\n[human]\nweight = 3.0\n[human.terms]\ntime_pressure = 0.25\n"
         "[[human.fuzzy]]\nname = 'thrill'\nweight = 0.5\nquantity = 'speed_over_limit'\n"
         "sets = [{ name = 'fast', points = [[0.0, 0.0], [0.2, 1.0]], value = 6.0 }]\n"
     )
-    assert persona.payoff == Payoff(
-        alpha={"safety": 0.5, "operational": 1.0, "human": 3.0},
-        terms=(
-            Weighted(name="collision", weight=10.0),
-            Weighted(name="clearance", weight=2.0, parameter=1.4),
-            Weighted(name="goal", weight=5.0),
-            Weighted(name="time_pressure", weight=0.25),
-        ),
-        fuzzy={"thrill": (0.5, THRILL)},
+    q = moment(world, [car(50.0, speed_mps=1.1 * 13.89), FAR])
+    q.advanced_m = np.array([[1.5, 0.0]])
+    shares = {name: float(value[0]) for name, value in persona.payoff.evaluate(q, 0).items()}
+    assert shares == pytest.approx(
+        {
+            "collision": 0.0,
+            "clearance": 0.5 * 2.0 * -0.5 * 0.1,  # a0 * weight * rate * step
+            "goal": 0.0,
+            "progress": 1.0 * 4.0 * 0.015,  # a1, 1 unless given, * weight * way / 100 m
+            "time_pressure": 3.0 * 0.25 * -1.0 * 0.1,  # a2 * weight * rate * step
+            "thrill": 3.0 * 0.5 * 6.0 * 0.1,  # a2 * weight * (the average of one set is its value) * step
+        },
+        abs=2e-4,
     )
+    assert persona.payoff.total(q, 0)[0] == pytest.approx(sum(shares.values()))
 
 
 def test_document__without_terms_is_refused(read: Callable[[str], Persona]) -> None:

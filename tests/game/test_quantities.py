@@ -102,13 +102,6 @@ def test_time_to_collision__of_a_car_cutting_in(moment: Moment, world: World) ->
     assert q.time_to_collision_s[0, 0] == pytest.approx(3.2 - 0.9 - (0.23 + 0.9 * np.cos(turned)), abs=1e-6)
 
 
-def test_clearance__to_a_vehicle_beside(moment: Moment, world: World) -> None:
-    q = moment(world, [car(50.0), car(51.0, LANE_0_M)])
-    assert q.vehicle_clearance_m[0] == pytest.approx([1.4, 1.4])  # 3.2 - 1.8
-    assert q.rail_clearance_m[0] == pytest.approx([0.7, 0.7], abs=0.02)  # 1.6 - 0.9, each on its side
-    assert q.clearance_m[0] == pytest.approx([0.7, 0.7], abs=0.02)
-
-
 def test_clearance__at_the_taper(moment: Moment, world: World) -> None:
     # the taper goes from (100, -6.4) to (130, -3.2); the front right corner of a car at (107.7, -4.8) is (110, -5.7);
     # at x = 110 the rail is at -6.4 + 10 * 3.2 / 30 = -5.3333, so the car is through it
