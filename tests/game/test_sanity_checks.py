@@ -295,29 +295,32 @@ def everywhere(request: pytest.FixtureRequest) -> Quantities:
     return Quantities(scene.world, state, Bodies(*poses, *size, state.present), np.zeros_like(offset), offset)
 
 
-@pytest.mark.parametrize("name", TERMS)
-def test_term__can_be_computed_at_every_place_of_every_route(name: str, everywhere: Quantities) -> None:
-    payoff = Payoff(
-        alpha=dict.fromkeys(GROUPS, 1.0),
-        terms=(Weighted(name=name, weight=1.0, parameter=2.0 if TERMS[name].parameter else None),),
-        fuzzy={},
-    )
-    for player in (EGO, NON_EGO):
-        (share,) = payoff.evaluate(everywhere, player).values()
-        assert share.shape == everywhere.state.step.shape
-        assert np.isfinite(share).all()
+LOW = FuzzySet(name="low", inputs=(0.0, 1.0), memberships=(1.0, 0.0), value=-1.0)
+HIGH = FuzzySet(name="high", inputs=(0.0, 1.0), memberships=(0.0, 1.0), value=2.0)
+PAYOFFS: dict[str, dict[str, Any]] = {
+    **{
+        name: {"terms": (Weighted(name=name, weight=1.0, parameter=2.0 if term.parameter else None),), "fuzzy": {}}
+        for name, term in TERMS.items()
+    },
+    **{
+        f"fuzzy {name}": {"terms": (), "fuzzy": {"fuzzy": (1.0, FuzzyFunction(name, (LOW, HIGH)))}}
+        for name in FUZZY_QUANTITIES
+    },
+}
 
 
-@pytest.mark.parametrize("name", FUZZY_QUANTITIES)
-def test_fuzzy_term__can_be_computed_at_every_place_of_every_route(name: str, everywhere: Quantities) -> None:
-    assert not np.isnan(getattr(everywhere, name)).any()  # without a leader the gap is infinite
-    sets = (
-        FuzzySet(name="low", inputs=(0.0, 1.0), memberships=(1.0, 0.0), value=-1.0),
-        FuzzySet(name="high", inputs=(0.0, 1.0), memberships=(0.0, 1.0), value=2.0),
-    )
-    payoff = Payoff(alpha=dict.fromkeys(GROUPS, 1.0), terms=(), fuzzy={"fuzzy": (1.0, FuzzyFunction(name, sets))})
+@pytest.mark.parametrize("name", PAYOFFS)
+def test_payoff__can_be_computed_at_every_place_of_every_route(name: str, everywhere: Quantities) -> None:
+    payoff = Payoff(alpha=dict.fromkeys(GROUPS, 1.0), **PAYOFFS[name])
     for player in (EGO, NON_EGO):
-        assert np.isfinite(payoff.total(everywhere, player)).all()
+        total = payoff.total(everywhere, player)
+        assert total.shape == everywhere.state.step.shape
+        assert np.isfinite(total).all()
+
+
+def test_quantities__of_fuzzy_terms_are_numbers_at_every_place_of_every_route(everywhere: Quantities) -> None:
+    for name in FUZZY_QUANTITIES:
+        assert not np.isnan(getattr(everywhere, name)).any(), name  # without a leader the gap is infinite
 
 
 def test_observation__can_be_made_at_every_place_of_every_route(everywhere: Quantities) -> None:

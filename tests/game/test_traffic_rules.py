@@ -206,23 +206,18 @@ def test_posted__knows_signals_and_signs_and_no_other_cars(moment: Moment, merge
         (80.1, 0.0, 0.0),  # within 10 m: it waits
         (80.1, 6.0, 0.0),  # or moves up: sqrt(2 * 2 * 9.9) = 6.3
         (89.0, 2.5, 0.5),
+        (74.0, 10.0, 2.0),
+        (74.0, 6.0, -2.0),
     ],
 )
-def test_speed_over_permitted__a_car_that_waits_is_not_late(
+def test_speed_over_permitted__is_a_share_of_the_limit_and_a_car_that_waits_is_not_late(
     moment: Moment, light: World, front_m: float, speed_mps: float, over_mps: float
 ) -> None:
     q = at(moment, light, front_m, speed_mps=speed_mps, signal=(Signal.RED, 1.0))
-    assert q.speed_over_permitted[0, 0] * LIMIT_MPS == pytest.approx(over_mps)
-
-
-def test_speed_over_permitted__is_a_share_of_the_limit(moment: Moment, light: World) -> None:
-    # 8 m/s are permitted 16 m before a red light; 10 m/s are 2 m/s more, 6 m/s are 2 m/s less
-    for speed_mps, over_mps in ((10.0, 2.0), (6.0, -2.0)):
-        q = at(moment, light, 74.0, speed_mps=speed_mps, signal=(Signal.RED, 1.0))
-        assert q.speed_over_permitted[0, 0] == pytest.approx(over_mps / LIMIT_MPS)
-        assert value_of(q, "speed_over_limit", None) == pytest.approx(-0.1 * max(over_mps, 0.0) / LIMIT_MPS)
-        assert value_of(q, "speed_under_limit", None) == pytest.approx(0.1 * min(over_mps, 0.0) / LIMIT_MPS)
-        assert q.speed_over_limit[0, 0] == pytest.approx(speed_mps / LIMIT_MPS - 1.0), "the limit itself is the same"
+    assert q.speed_over_permitted[0, 0] == pytest.approx(over_mps / LIMIT_MPS)
+    assert value_of(q, "speed_over_limit", None) == pytest.approx(-0.1 * max(over_mps, 0.0) / LIMIT_MPS)
+    assert value_of(q, "speed_under_limit", None) == pytest.approx(0.1 * min(over_mps, 0.0) / LIMIT_MPS)
+    assert q.speed_over_limit[0, 0] == pytest.approx(speed_mps / LIMIT_MPS - 1.0), "the limit itself is the same"
 
 
 # --- what is observed of them ----------------------------------------------------------------------------------------

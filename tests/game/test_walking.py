@@ -74,9 +74,3 @@ def test_bicycle__turns_no_sharper_than_it_leans() -> None:
     state = state_of(6.0, steering_rad=0.8)
     move(state, Requested(np.zeros((1, 1)), np.array([[0.8]]), np.array([[True]])), bicycle, STEP_S)
     assert state.heading_rad[0, 0] == pytest.approx(0.1 * 3.6 / 6.0)  # 3.6 m/s2 at 6 m/s
-    car = actuators(**{**limits, "max_speed_mps": 8.0, "max_lateral_mps2": 15.0})
-    state = state_of(6.0, steering_rad=0.8)
-    move(state, Requested(np.zeros((1, 1)), np.array([[0.8]]), np.array([[True]])), car, STEP_S)
-    # without the limit, the tightest curve at the lock, cos(atan(tan(0.8) / 2)) tan(0.8) / 1.05 = 0.872 per metre,
-    # needs 31 m/s2, and the tyres have 0.8 g
-    assert state.heading_rad[0, 0] == pytest.approx(0.1 * 0.8 * 9.81 / 6.0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import json
 import math
 import re
@@ -16,7 +15,7 @@ from harness.reports.cards import STILL_DRIVES
 from harness.reports.learning import searches
 from harness.reports.provenance import rounds
 from harness.reports.run_tables import QUESTIONS, RECONFIGURED
-from tests.support.pages import campaign, rendered
+from tests.support.pages import Page, campaign, rendered
 
 PAYOFFS = (2.0, 1.5, math.nan, 4.25, 4.25)
 
@@ -56,13 +55,8 @@ def reconfigured(**options: Any) -> dict[str, Any]:
     return given | {"replays": [], "reconfiguration": trials()}
 
 
-def words_of(page: str) -> str:
-    text = re.sub(r"<(script|style)>.*?</\1>", "", page, flags=re.DOTALL)
-    return html.unescape(re.sub(r"\s+", " ", re.sub(r"<[^>]*>", " ", text)))
-
-
 def test_page__shows_naive_against_reconfigured_as_it_does_naive_against_retrained() -> None:
-    page = words_of(rendered(**reconfigured()))
+    page = Page(rendered(**reconfigured())).text
     assert f"{QUESTIONS['RQ2'].format(doing=RECONFIGURED.doing)} Yes RQ2: yes" in page
     assert "Reconfiguration reduces the ego's failures against the speedy driver from 18 of 60 games to 2 of 60" in page
     assert "reconfigured ego, against speedy" in page
@@ -78,7 +72,7 @@ def test_page__says_what_was_found_and_escapes_names() -> None:
     assert '<tr><th scope="row">gap_s</th><td>1.5</td><td>2.25</td><td>\N{MINUS SIGN}1</td><td>3</td></tr>' in page
     assert "<b>odd</b>" not in page
     assert "&lt;b&gt;odd&lt;/b&gt;" in page
-    assert rounds([{"kind": "reconfiguration"}]) in words_of(page)
+    assert rounds([{"kind": "reconfiguration"}]) in Page(page).text
 
 
 def test_searches__in_words() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from html.parser import HTMLParser
 from typing import Any
@@ -13,12 +13,12 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
-from harness.campaign.plan.alone_bounds import alone_bounds
+from harness.campaign.plan.paper_rounds import questions
 from harness.config.campaign import Campaign
 from harness.evaluation.columns import TABLES
 from harness.evaluation.comparisons.comparison import compare
 from harness.evaluation.comparisons.summary import summarise
-from harness.evaluation.research_questions import Question, ResearchQuestion
+from harness.evaluation.research_questions import ResearchQuestion
 from harness.evaluation.strategies import (
     NAIVE_ALONE,
     NAIVE_VS_SUMO,
@@ -73,8 +73,6 @@ def campaign(
         for episode in range(games)
     ]
     episodes = table_of("episodes", rows)
-    asked: Sequence[ResearchQuestion] = ("RQ1", "RQ2") if retrained else ("RQ1",)
-    questions = _questions([(question, persona, seed) for persona in personas for seed in seeds for question in asked])
     stages = [strategy_name(each) for each in strategies]
     training = pd.DataFrame([row for stage in stages for seed in seeds for row in _windows(stage, seed, random)])
     manifest = {
@@ -103,31 +101,22 @@ def campaign(
         "strategies": {strategy_name(each): each for each in strategies},
         "episodes": episodes,
         "summary": summarise(episodes),
-        "comparisons": compare(questions, episodes, 0.01),
+        "comparisons": _compared(manifest, episodes, {"RQ1", "RQ2"} if retrained else {"RQ1"}),
         "training": typed(training),
         "replays": replays,
     }
 
 
-def _questions(
-    asked: Iterable[tuple[ResearchQuestion, str, int]], competence: Mapping[str, float] = UNGATED
-) -> list[Question]:
-    """These questions about a persona and seed; `competence` is the table of a campaign."""
-    document = {"name": "a", "scene": "b", "personas": ["x.toml"], "competence": competence}
-    campaign, questions = Campaign.model_validate(document), []
-    for question, persona, seed in asked:
-        naive = against_persona(NaiveEgo(), persona)
-        arms = (
-            [NAIVE_ALONE, naive]
-            if question == "RQ1"
-            else [naive, against_persona(RetrainedEgo(against=persona), persona)]
-        )
-        before, after = (arm.name for arm in arms)
-        alone = alone_bounds(campaign, naive)
-        questions.append(
-            Question(question=question, persona=persona, seed=seed, baseline=before, treatment=after, alone=alone)
-        )
-    return questions
+def _compared(
+    manifest: Mapping[str, Any],
+    episodes: pd.DataFrame,
+    asked: Collection[ResearchQuestion],
+    competence: Mapping[str, float] = UNGATED,
+) -> pd.DataFrame:
+    """The answers of the episodes to these questions; `competence` is the table of a campaign."""
+    document = {"name": "a", "scene": "b", "personas": ["x.toml"], "seeds": manifest["seeds"], "competence": competence}
+    of_campaign = questions(Campaign.model_validate(document), manifest["personas"])
+    return compare([each for each in of_campaign if each.question in asked], episodes, 0.01)
 
 
 def _game(
@@ -261,8 +250,6 @@ def with_errors(arguments: dict[str, Any], games: Any) -> dict[str, Any]:
 
 def recomputed(arguments: dict[str, Any], competence: Mapping[str, float] = UNGATED) -> dict[str, Any]:
     """The campaign with tables that fit its changed episodes; `competence` is its table of that name."""
-    old = arguments["comparisons"]
-    asked = old.loc[old["metric"] == "failure", ["question", "persona", "seed"]].itertuples(index=False, name=None)
-    arguments["summary"] = summarise(arguments["episodes"])
-    arguments["comparisons"] = compare(_questions(asked, competence), arguments["episodes"], 0.01)
-    return arguments
+    episodes, asked = arguments["episodes"], set(arguments["comparisons"]["question"])
+    comparisons = _compared(arguments["manifest"], episodes, asked, competence)
+    return arguments | {"summary": summarise(episodes), "comparisons": comparisons}
