@@ -51,14 +51,6 @@ def test_locate__every_player_has_its_own_route() -> None:
     assert np.isnan(routes.lane_offset_m[routes.first_row[0], 1:]).all()  # the first route has one lane
 
 
-def test_locate__follows_a_car_round_a_hairpin() -> None:
-    routes, station = Routes.of([arc(6.0, 18.0)]), 0.0
-    for true in np.arange(0.0, 18.0, 0.8):
-        found, _ = locate(routes, [on_arc(6.0, true, -3.0)], [station])
-        station = float(found[0])
-        assert station == pytest.approx(true, abs=0.02)
-
-
 def test_rows__stay_within_a_players_own_route() -> None:
     routes = Routes.of([straight(0.0), straight(0.0)])
     rows = routes.rows(np.array([[1e4, -1e4]]))

@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 
 from harness.config.road_user import DEFAULTS
-from harness.game.bicycle import ActuatorLimits, Requested, curvature_per_m, move
+from harness.game.bicycle import ActuatorLimits, Requested, curvature_per_m
 from harness.game.state import State
 from harness.game.walking import MAX_BACKWARD_MPS, MAX_TURN_RADPS, walk
-from tests.support.bicycle import actuators, state_of
-
-STEP_S = 0.1
+from tests.support.bicycle import STEP_S, actuators, advance, state_of
 
 
 def walker(**changes: float) -> ActuatorLimits:
@@ -72,5 +70,5 @@ def test_bicycle__turns_no_sharper_than_it_leans() -> None:
     bicycle = actuators(**{**limits, "max_speed_mps": 8.0})
     assert limits["max_lateral_mps2"] == pytest.approx(9.81 * tan(radians(20.0)), abs=0.05)
     state = state_of(6.0, steering_rad=0.8)
-    move(state, Requested(np.zeros((1, 1)), np.array([[0.8]]), np.array([[True]])), bicycle, STEP_S)
+    advance(state, 0.0, 0.8, bicycle)
     assert state.heading_rad[0, 0] == pytest.approx(0.1 * 3.6 / 6.0)  # 3.6 m/s2 at 6 m/s

@@ -160,28 +160,41 @@ def verdict_texts(ego_gain, non_ego_gain, responses=(EGO, NON_EGO), failing=0, g
     return verdict.label, plain(verdict.sentence), plain(verdict.speed), verdict.tone
 
 
-def test_words__both_sides_could_gain():
-    label, sentence, induced, tone = verdict_texts(0.2, 6.2, failing=12)
-    assert label == "no"
-    assert sentence == f"The ego could still gain 2 % of its payoff; the speedy driver 31 %: {MEANINGS[NO]}."
-    assert induced == (
-        "A speedy driver newly trained against this ego makes it fail in 12 of 100 games (12 %; 95 %: 6.4–20 %) "
-        "instead of 3."
-    )
-    assert tone == "harm"
+FAILS = "A speedy driver newly trained against this ego makes it fail in 12 of 100 games (12 %; 95 %: 6.4–20 %) instead"
 
 
-def test_words__nothing_better_found_is_not_refuted():
-    label, sentence, induced, tone = verdict_texts(-0.2, -0.4, failing=12)
-    assert label == "not refuted"
-    assert sentence == (
-        f"For the ego nothing better was found; for the speedy driver nothing better was found: {MEANINGS[NEAR]}."
-    )
-    assert induced.endswith("instead of 3, but this driver does not earn more by it.")
-    assert tone == "harm"  # the ego fails more, whatever for
-    assert verdict_texts(0, -0.4)[1].startswith(
-        "The best response of the ego earns the same in every game; for the speedy"
-    )
+@pytest.mark.parametrize(
+    ("gains", "given", "label", "sentence", "induced", "tone"),
+    [
+        (
+            (0.2, 6.2),
+            {"failing": 12},
+            "no",
+            f"The ego could still gain 2 % of its payoff; the speedy driver 31 %: {MEANINGS[NO]}.",
+            f"{FAILS} of 3.",
+            "harm",
+        ),
+        (
+            (-0.2, -0.4),
+            {"failing": 12},
+            "not refuted",
+            f"For the ego nothing better was found; for the speedy driver nothing better was found: {MEANINGS[NEAR]}.",
+            f"{FAILS} of 3, but this driver does not earn more by it.",
+            "harm",  # the ego fails more, whatever for
+        ),
+        (
+            (-0.2, 0),
+            {"responses": (EGO,)},
+            "not decided",
+            "For the ego nothing better was found; no best response of the speedy driver was trained: "
+            f"{MEANINGS[OPEN]}.",
+            "",
+            "open",
+        ),
+    ],
+)
+def test_words__of_gains(gains, given, label, sentence, induced, tone):
+    assert verdict_texts(*gains, **given) == (label, sentence, induced, tone)
 
 
 def test_words__a_gain_not_distinguishable_from_0_has_its_interval():
@@ -193,15 +206,6 @@ def test_words__a_gain_not_distinguishable_from_0_has_its_interval():
         "For the ego a gain of 30 % was measured, which is not distinguishable from 0 (95 %: −5 to 65 %); "
         "for the speedy driver"
     )
-
-
-def test_words__with_one_side_only_nothing_is_decided():
-    label, sentence, induced, _ = verdict_texts(-0.2, 0, responses=(EGO,))
-    assert label == "not decided"
-    assert sentence == (
-        f"For the ego nothing better was found; no best response of the speedy driver was trained: {MEANINGS[OPEN]}."
-    )
-    assert induced == ""
 
 
 @pytest.mark.parametrize("verdict", list(GapVerdict))

@@ -72,13 +72,6 @@ def verdict_texts(arguments):
     return [(label, sentence.replace("\N{NO-BREAK SPACE}", " ")) for label, sentence in plain]
 
 
-def before_holm_only():
-    arguments = campaign(personas=["speedy"], failing={"naive": 0.1})
-    failure = arguments["comparisons"].index[0]
-    arguments["comparisons"].loc[failure, ["p_holm", "verdict"]] = [0.025, Verdict.BEFORE_HOLM_ONLY.value]
-    return arguments
-
-
 def not_played():
     arguments = campaign(personas=["speedy"])
     return with_errors(arguments, arguments["episodes"]["arm"] == "retrained_vs_speedy")
@@ -119,7 +112,6 @@ MCNEMAR = "McNemar's exact test gives p < 0.0001. This is below the campaign's s
             f"3 of 60 games against the speedy driver and in 0 of 60 alone: {CHANCE}",
         ),
         (failing(naive=0.05, retrained=0.2), "RQ2: not shown", f"12 of 60 games, the naive ego in 3 of 60: {CHANCE}"),
-        (before_holm_only, "RQ1: only before Holm's correction", "correction, but not after Holm's correction"),
         (failing(naive=1), "RQ1: no t statistic", f"{NO_T_STATISTIC.format(pairs=60)}. {MCNEMAR}"),
         (not_played, "RQ1: yes", "makes the naive ego fail in 18 of 60 games instead of 0 of 60"),
         (not_played, "RQ2: not answered", NOT_PLAYED),
@@ -220,14 +212,6 @@ def test_words__a_person_that_cannot_drive_leaves_both_questions_unanswered():
     assert not any("significantly" in sentence for _, sentence in verdict_texts(arguments))
 
 
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [(-0.004, "\N{MINUS SIGN}0.004"), (-0.05, "\N{MINUS SIGN}0.05"), (0.004, "0"), (0.0, "0"), (-0.0, "0")],
-)
-def test_numbers__that_round_to_0_keep_their_sign(value, text):
-    assert signed(value, 2) == text
-
-
 def test_numbers__have_a_typographic_form():
     assert [p_number(p) for p in (0.00031, 0.0123, 0.5, 1.0)] == ["0.0003", "0.0123", "0.5", "1"]
     assert p_text(1e-30) == "p\N{NO-BREAK SPACE}<\N{NO-BREAK SPACE}0.0001", "never rounded to 0 or 1"
@@ -235,6 +219,8 @@ def test_numbers__have_a_typographic_form():
     assert (p_number(math.nan), p_text(math.nan)) == ("–", "no p-value")
     assert (number(-1.5, 1), number(-0.001, 2), number(math.nan, 1)) == ("\N{MINUS SIGN}1.5", "0.00", "–")
     assert [percent(share)[:-2] for share in (0.25, 0.0362, 1)] == ["25", "3.6", "100"]
+    kept = [signed(value, 2) for value in (-0.004, -0.05, 0.004, 0.0, -0.0)]
+    assert kept == ["\N{MINUS SIGN}0.004", "\N{MINUS SIGN}0.05", "0", "0", "0"], "what rounds to 0 keeps its sign"
     durations = ["12.3 s", "1 min 00 s", "3 min 05 s", "1 h 02 min", "–"]
     assert [duration(s) for s in (12.34, 59.99, 185, 3725, None)] == durations
 
@@ -325,14 +311,9 @@ def test_page__is_the_same_bytes_for_the_same_input(small):
     assert once == again
 
 
-def test_page__loads_nothing(html, page):
-    named = re.findall(r"https?://[^\s\"'`<>)]*", html)
-    harmless = ("http://www.w3.org/", "https://github.com/leeoniya/uPlot", "https://datatables.net")  # names, comments
-    assert [each for each in named if not each.startswith(harmless)] == []
+def test_page__permits_no_request(page):
+    """That it makes none, test_browser.py says."""
     assert not [attributes for _, attributes in page.tags if "src" in attributes]
-    assert "@import" not in html
-    styles = re.sub(r"<script.*?</script>", "", html, flags=re.DOTALL)
-    assert all(target.startswith("#") for target in re.findall(r"url\(([^)]*)\)", styles))
     (policy,) = [a["content"] for tag, a in page.tags if tag == "meta" and "http-equiv" in a]
     assert policy.startswith("default-src 'none'")
 

@@ -24,6 +24,7 @@ from harness.road.scene.open_scene import OpenScene
 from harness.sumo import subprocess_simulation
 from harness.sumo.libsumo_simulation import LibsumoSimulation
 from harness.sumo.subprocess_simulation import SubprocessSimulation, open_simulation
+from tests.support.processes import is_running
 from tests.support.repository import REPOSITORY
 from tests.support.scenes import LEFT_Y, ZIPPER, ZIPPER_EDGES, ZIPPER_NODES, build_scene, drawn, placed
 
@@ -42,22 +43,11 @@ def far(scene: OpenScene) -> Iterator[SubprocessSimulation]:
     simulation.close()
 
 
-def lives(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    status = Path(f"/proc/{process}/stat")
-    return not (status.exists() and status.read_text().rsplit(")", 1)[1].split()[0] == "Z")
-
-
 def ends(process: int, within_s: float = 300.0) -> bool:
     until = time.monotonic() + within_s
-    while time.monotonic() < until:
-        if not lives(process):
-            return True
+    while is_running(process) and time.monotonic() < until:
         time.sleep(0.02)
-    return False
+    return not is_running(process)
 
 
 def test_open__one_simulation_at_a_time_is_local(scene: OpenScene) -> None:
