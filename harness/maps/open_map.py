@@ -17,7 +17,7 @@ from harness.game.arrays import FloatArray
 from harness.game.junctions import SIGNALS, Signal
 from harness.maps.game_plans import GamePlan, Plans
 from harness.maps.import_map import import_map
-from harness.road.net.net_listing import ListedJunction, ListedLane, edges_near, listed_junctions, listed_lanes
+from harness.road.net.net_listing import ListedJunction, ListedLane, edges_near, listed_junctions, listed_lane
 from harness.road.net.network import car_lanes, junctions_near, lane_line
 from harness.road.net.tiles import write_tiles
 from harness.road.xml.xml_file import number_of, parse_xml
@@ -60,7 +60,7 @@ class OpenMap:
     def listed(self) -> tuple[list[ListedLane], list[ListedJunction]]:
         """Lanes and junctions, for a drawing."""
         edges = self.net.getEdges(withInternal=False)
-        return listed_lanes(edges), listed_junctions(edges)
+        return [listed_lane(lane) for edge in edges for lane in edge.getLanes()], listed_junctions(edges)
 
 
 def open_map(source: Path, folder: Path, *, left_hand: bool) -> OpenMap:

@@ -96,7 +96,11 @@ def _with_goal(net: Net, edges: Sequence[Edge], place: int) -> PlannedRoute | No
         goal_edge=edges[k].getID(),
         goal_position_m=float(np.floor(10.0 * share * edges[k].getLength()) / 10.0),
         limit_mps=limit_mps,
-        lights=tuple((ends[k], name) for k, edge in enumerate(before) for name in _lights(edge)),
+        lights=tuple(
+            (ends[k], name)
+            for k, edge in enumerate(before)
+            for name in sorted({link.getTLSID() for link in _onward(edge) if link.getTLSID()})
+        ),
     )
 
 
@@ -140,10 +144,6 @@ def _cost(link: Connection, edge: Edge, rings: Collection[str]) -> tuple[float, 
     return cost, edge.getID()
 
 
-def _lights(edge: Edge) -> list[str]:
-    return sorted({link.getTLSID() for link in _onward(edge) if link.getTLSID()})
-
-
 def _onward(edge: Edge) -> list[Connection]:
     return for_cars(link for links in edge.getOutgoing().values() for link in links)
 
@@ -158,7 +158,9 @@ def way_over(candidate: Candidate, before_m: float) -> FloatArray | None:
     come, go = _nearest(lanes, near, before_m), _nearest(lanes, far, _ONTO_M)
     if come is None or go is None:
         return None
-    return _without_repeats(np.concatenate((come[::-1], [near], [far], go)))
+    points = np.concatenate((come[::-1], [near], [far], go))
+    apart = np.hypot(*np.diff(points, axis=0).T) > 0.05
+    return points[np.concatenate(([True], apart))]
 
 
 def _pavements(*edges: Edge) -> list[Lane]:
@@ -176,8 +178,3 @@ def _nearest(lanes: list[Lane], point: FloatArray, length_m: float) -> FloatArra
     if line is None or float(np.hypot(*(line[0] - point))) > _FARTHEST_M:
         return None
     return shapely.get_coordinates(substring(shapely.LineString(line), 0.5, 0.5 + length_m))
-
-
-def _without_repeats(points: FloatArray) -> FloatArray:
-    apart = np.hypot(*np.diff(points, axis=0).T) > 0.05
-    return points[np.concatenate(([True], apart))]

@@ -131,13 +131,8 @@ def _vehicles(
     return people + [
         _vehicle(state, moving[state.get("id", "")], departures[state.get("id", "")], routes=routes, end_s=end_s)
         for state in parse_xml(folder / "state.xml").findall("vehicle")
-        if state.get("id") in moving and not _is_parked(state)
+        if state.get("id") in moving and state.find("stop[1][@started][@parking]") is None
     ]
-
-
-def _is_parked(state: ElementTree.Element) -> bool:
-    stop = state.find("stop")
-    return stop is not None and stop.get("started") is not None and stop.get("parking") is not None
 
 
 def _vehicle(

@@ -62,9 +62,24 @@ def edges_near(net: Net, path: Path, name: str | None, within_m: float) -> list[
     return [edges[k] for k in order if distances_m[k] <= within_m]
 
 
-def listed_lanes(edges: Sequence[Edge]) -> list[ListedLane]:
-    """The lanes of edges, in SUMO's order."""
-    return [_listed(lane) for edge in edges for lane in edge.getLanes()]
+def listed_lane(lane: Lane) -> ListedLane:
+    """A lane as a record."""
+    edge, line = lane.getEdge(), lane_line(lane)
+    shape = max(shapely.get_parts(lane_shape(line, lane.getWidth())), key=shapely.area)
+    return ListedLane(
+        name=lane.getID(),
+        edge=edge.getID(),
+        start_junction=edge.getFromNode().getID(),
+        leads_to=tuple(f"{link.getDirection()} {link.getTo().getID()}" for link in lane.getOutgoing()),
+        end_junction=edge.getToNode().getID(),
+        length_m=lane.getLength(),
+        limit_mps=lane.getSpeed(),
+        width_m=lane.getWidth(),
+        permissions=_permissions(lane),
+        for_cars=lane.allows("passenger"),
+        line=line,
+        outline=shapely.get_coordinates(shape.exterior),
+    )
 
 
 def listed_junctions(edges: Sequence[Edge]) -> list[ListedJunction]:
@@ -89,25 +104,6 @@ def listed_junctions(edges: Sequence[Edge]) -> list[ListedJunction]:
         )
         for node in nodes
     ]
-
-
-def _listed(lane: Lane) -> ListedLane:
-    edge, line = lane.getEdge(), lane_line(lane)
-    shape = max(shapely.get_parts(lane_shape(line, lane.getWidth())), key=shapely.area)
-    return ListedLane(
-        name=lane.getID(),
-        edge=edge.getID(),
-        start_junction=edge.getFromNode().getID(),
-        leads_to=tuple(f"{link.getDirection()} {link.getTo().getID()}" for link in lane.getOutgoing()),
-        end_junction=edge.getToNode().getID(),
-        length_m=lane.getLength(),
-        limit_mps=lane.getSpeed(),
-        width_m=lane.getWidth(),
-        permissions=_permissions(lane),
-        for_cars=lane.allows("passenger"),
-        line=line,
-        outline=shapely.get_coordinates(shape.exterior),
-    )
 
 
 def _permissions(lane: Lane) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import shapely
@@ -19,7 +19,7 @@ from harness.game.junctions import Conflicts, Control, RightOfWay, StopLines, St
 from harness.road.net.network import car_lanes, lane_line
 from harness.road.net.own_lanes import LanesOf
 from harness.road.net.route_table import JunctionOnRoute, junctions_on_route
-from harness.road.net.stream import Feeders, Stream, carries_traffic, samples_of
+from harness.road.net.stream import Feeders, Stream, carries_traffic
 
 _MERGING_M = 10.0  # length of the zone of a stream that joins the route
 _LEAST_AREA_M2 = 0.5
@@ -37,17 +37,8 @@ def right_of_way(net: Net, routes: Sequence[Sequence[Edge]], lanes_of: Sequence[
     return _Builder(net).build([junctions_on_route(net, *each) for each in zip(routes, users, strict=True)])
 
 
-def control_of(link: Connection) -> Control:
-    """What controls the entry into a junction by a link."""
+def _control_of(link: Connection) -> Control:
     return Control.SIGNAL if link.getTLSID() else _CONTROL.get(link.getState(), Control.NONE)
-
-
-class _OwnLink(NamedTuple):
-    """A link of a junction on a player's route, and the range of lateral offsets in which a car is on its lane."""
-
-    link: Connection
-    right_m: float
-    left_m: float
 
 
 class _Builder:
@@ -59,12 +50,13 @@ class _Builder:
 
     def build(self, junctions: Sequence[Sequence[JunctionOnRoute]]) -> RightOfWay:
         numbered = [(player, junction) for player, on_route in enumerate(junctions) for junction in on_route]
-        lines = [(k, each.begin_m, control_of(each.link), self._column(each.link)) for k, each in numbered]
+        lines = [(k, each.begin_m, _control_of(each.link), self._column(each.link)) for k, each in numbered]
         conflicts = Conflicts.of([row for k, each in numbered for row in self._conflicts(k, each)])
-        samples = samples_of([self._stream(link) for link in self._numbers])
+        samples = [self._stream(link).samples for link in self._numbers]
+        number = np.repeat(np.arange(len(samples), dtype=np.int64), [len(each) for each in samples])
         return RightOfWay(
             conflicts=conflicts,
-            streams=Streams.of(*samples, conflicts, players=len(junctions)),
+            streams=Streams.of(np.concatenate([*samples, np.zeros((0, 7))]), number, conflicts, players=len(junctions)),
             stop_lines=StopLines.of(lines),
             signal_links=tuple(self._columns),
             stream_lanes=tuple((link.getFromLane().getID(), link.getToLane().getID()) for link in self._numbers),
@@ -82,16 +74,16 @@ class _Builder:
     def _conflicts(self, player: int, junction: JunctionOnRoute) -> Iterator[dict[str, Any]]:
         """The rows of `Conflicts` of a junction on a player's route: where the lanes of two links overlap."""
         on_route = self._stream(junction.link).onward
-        for own in _own_links(junction):
-            for foe in foes_of(own.link):
-                way, stream = self._stream(own.link), self._stream(foe)
-                joins, overlap = own.link.getToLane() is foe.getToLane(), overlap_of(way, stream)
+        for link, right_m, left_m in _own_links(junction):
+            for foe in foes_of(link):
+                way, stream = self._stream(link), self._stream(foe)
+                joins, overlap = link.getToLane() is foe.getToLane(), overlap_of(way, stream)
                 if overlap is None:
                     continue
-                begin_m, end_m = _extent(on_route, overlap)
-                zone_m, zone_end_m = _extent(stream.onward, overlap)
+                begin_m, end_m = extent_of(on_route, overlap)
+                zone_m, zone_end_m = extent_of(stream.onward, overlap)
                 from_m, until_m = _apart(stream, way, zone_m)
-                yields, first_come = yields_to(own.link, foe)
+                yields, first_come = yields_to(link, foe)
                 yield {
                     "player": player,
                     "stream": self._numbers.setdefault(foe, len(self._numbers)),
@@ -102,9 +94,9 @@ class _Builder:
                     "first_come": first_come,
                     "stop_m": junction.begin_m,
                     "wait_m": junction.begin_m + (way.inner_wait_m if way.inner_wait_m < begin_m else 0.0),
-                    "right_m": own.right_m,
-                    "left_m": own.left_m,
-                    "own_link": self._column(own.link),
+                    "right_m": right_m,
+                    "left_m": left_m,
+                    "own_link": self._column(link),
                     "other_link": self._column(foe),
                     "from_m": from_m,
                     "until_m": until_m,
@@ -116,7 +108,7 @@ class _Builder:
 
 def _turns_across(way: Stream, other: Stream) -> bool:
     """Whether a way turns, and another one comes from the opposite direction."""
-    begin_rad, end_rad = (_heading_rad(way.onward, place_m) for place_m in (0.0, way.length_m))
+    begin_rad, end_rad = (_heading_rad(way.onward, place_m) for place_m in (0.0, way.inner.length))
     turns = np.cos(end_rad - begin_rad) < _STRAIGHT
     return bool(turns and np.cos(_heading_rad(other.onward, 0.0) - begin_rad) < -_ALIKE)
 
@@ -132,8 +124,9 @@ def _heading_rad(line: shapely.LineString, place_m: float) -> float:
     return float(_points_and_headings(line, np.array([place_m]))[1][0])
 
 
-def _own_links(junction: JunctionOnRoute) -> list[_OwnLink]:
-    """The links of a junction on a route, each with the bounds of its lane: halfway to the next lane of the route."""
+def _own_links(junction: JunctionOnRoute) -> list[tuple[Connection, float, float]]:
+    """The links of a junction on a route, each with the lateral offsets, right and left, between which a car is on its
+    lane: halfway to the next lane of the route."""
     end = lane_line(junction.link.getFromLane())[-2:]
     along = (end[1] - end[0]) / max(float(np.linalg.norm(end[1] - end[0])), 1e-9)
     left = np.array([-along[1], along[0]])
@@ -143,7 +136,7 @@ def _own_links(junction: JunctionOnRoute) -> list[_OwnLink]:
     offsets = sorted(lanes.values())
     bounds = [-np.inf, *((a + b) / 2.0 for a, b in pairwise(offsets)), np.inf]
     places = [offsets.index(lanes[link.getFromLane()]) for link in junction.links]
-    return [_OwnLink(link, bounds[k], bounds[k + 1]) for link, k in zip(junction.links, places, strict=True)]
+    return [(link, bounds[k], bounds[k + 1]) for link, k in zip(junction.links, places, strict=True)]
 
 
 def foes_of(own: Connection) -> list[Connection]:
@@ -173,7 +166,8 @@ def yields_to(own: Connection, foe: Connection) -> tuple[bool, bool]:
     return (True, True) if own_major == foe_major else (foe_major, False)
 
 
-def _extent(line: shapely.LineString, overlap: BaseGeometry) -> tuple[float, float]:
+def extent_of(line: shapely.LineString, overlap: BaseGeometry) -> tuple[float, float]:
+    """The begin and the end of an area along a line, in metres."""
     places = shapely.line_locate_point(line, shapely.points(shapely.get_coordinates(overlap)))
     return float(places.min()), float(places.max())
 

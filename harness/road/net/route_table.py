@@ -45,8 +45,7 @@ class JunctionOnRoute:
 
     link: Connection  # that the route's line follows
     links: list[Connection]  # all that cars may take from the one edge to the other
-    begin_m: float  # stations of the route's line
-    end_m: float
+    begin_m: float  # station of the route's line
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +67,6 @@ def junctions_on_route(net: Net, edges: Sequence[Edge], lanes_of: LanesOf = car_
             link=link,
             links=_links_between(edges[k], edges[k + 1], lanes_of),
             begin_m=starts[2 * k + 1],
-            end_m=starts[2 * k + 2],
         )
         for k, link in enumerate(_links(edges, lanes_of))
     ]

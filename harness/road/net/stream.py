@@ -14,7 +14,7 @@ from sumolib.net import Net
 from sumolib.net.connection import Connection
 from sumolib.net.lane import Lane
 
-from harness.game.arrays import FloatArray, IntArray
+from harness.game.arrays import FloatArray
 from harness.road.net.network import TURNAROUNDS, inner_lanes, lane_line
 from harness.road.net.route_table import line_over_junction
 
@@ -83,9 +83,9 @@ class Stream:
         self.width_m = float(link.getFromLane().getWidth())
 
     @cached_property
-    def _inner(self) -> FloatArray:
-        """[n, 2] the link's line over the junction."""
-        return line_over_junction(self._feeders.net, self.link)
+    def inner(self) -> shapely.LineString:
+        """The link's line over the junction."""
+        return _joined([line_over_junction(self._feeders.net, self.link)])
 
     @cached_property
     def inner_wait_m(self) -> float:
@@ -95,16 +95,11 @@ class Stream:
         return float(_joined([lane_line(lanes[0])]).length) if len(lanes) > 1 else 0.0
 
     @cached_property
-    def length_m(self) -> float:
-        """Length of the link's line over the junction."""
-        return float(_joined([self._inner]).length)
-
-    @cached_property
     def onward(self) -> shapely.LineString:
         """The line from the stop line on, to a point beyond the junction."""
         beyond = shapely.LineString(lane_line(self.link.getToLane()))
         cut = substring(beyond, 0.0, _BEYOND_M)
-        return _joined([self._inner, shapely.get_coordinates(cut)])
+        return _joined([shapely.get_coordinates(self.inner), shapely.get_coordinates(cut)])
 
     @cached_property
     def nearby(self) -> tuple[shapely.LineString, float]:
@@ -114,7 +109,7 @@ class Stream:
 
     def swept(self, beyond: bool) -> BaseGeometry:
         """The area that cars on the link need inside the junction and, if wanted, shortly beyond it."""
-        line = self.onward if beyond else _joined([self._inner])
+        line = self.onward if beyond else self.inner
         return line.buffer(min(CORRIDOR_M, self.width_m) / 2.0, cap_style="flat", join_style="mitre")
 
     @cached_property
@@ -148,10 +143,3 @@ def samples_on(piece: Piece) -> FloatArray:
     half_m = np.full(count, 0.5 * length_m / count + _SPARE_M)
     width = np.full(count, 0.5 * piece.width_m)
     return np.stack((*points.T, np.cos(heading), np.sin(heading), width, half_m, piece.begin_m + middle), axis=1)
-
-
-def samples_of(streams: Sequence[Stream]) -> tuple[FloatArray, IntArray]:
-    """[N, 7] the samples of streams, and [N] the number of the stream of each."""
-    samples = [stream.samples for stream in streams]
-    number = np.repeat(np.arange(len(samples)), [len(each) for each in samples])
-    return np.concatenate([*samples, np.zeros((0, 7))]), number.astype(np.int64)

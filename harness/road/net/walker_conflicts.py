@@ -22,7 +22,8 @@ from harness.game.arrays import FloatArray
 from harness.game.junctions import KERB_M, Conflicts, Control, RightOfWay, StopLines, Streams
 from harness.game.road import Route
 from harness.road.net.network import lane_line
-from harness.road.net.route_table import line_over_junction, route_points
+from harness.road.net.right_of_way_table import extent_of
+from harness.road.net.route_table import route_points
 from harness.road.net.stream import CORRIDOR_M, USERS, Feeders, Piece, Stream, carries_traffic, samples_on
 
 WALKERS_STREAM_M = 3.0
@@ -121,9 +122,9 @@ def _traffic_crossed(feeders: Feeders, way: WalkersWay) -> Iterator[tuple[tuple[
             yield (lane.getID(), lane.getID()), np.concatenate(samples), lane.getWidth(), from_line
     for link in (link for node in net.getNodes() if way.marked for link in node.getConnections()):
         if carries_traffic(link):
-            stream, inner = Stream(link, feeders), shapely.LineString(line_over_junction(net, link))
+            stream = Stream(link, feeders)
             name = (link.getFromLane().getID(), link.getToLane().getID())
-            for zone in _zones(way.line, _WALKER_M, inner, min(CORRIDOR_M, stream.width_m)):
+            for zone in _zones(way.line, _WALKER_M, stream.inner, min(CORRIDOR_M, stream.width_m)):
                 yield name, stream.samples, stream.width_m, zone
 
 
@@ -137,9 +138,7 @@ def _zones(
     overlap = needed.intersection(other.buffer(0.5 * other_width_m, **_CORRIDOR_STYLE))
     for part in shapely.get_parts(overlap):
         if part.area > 0.0 and part.intersects(own) and part.intersects(other):
-            corners = shapely.points(shapely.get_coordinates(part))
-            along, beside = (shapely.line_locate_point(line, corners) for line in (own, other))
-            yield _Zone(float(along.min()), float(along.max()), float(beside.min()), float(beside.max()))
+            yield _Zone(*extent_of(own, part), *extent_of(other, part))
 
 
 def _row(player: int, stream: int, zone: _Zone, *, yields: bool, before_m: float) -> dict[str, Any]:
