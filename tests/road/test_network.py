@@ -263,17 +263,6 @@ def test_change_of_lanes__the_line_changes_lanes_on_the_edge(nets: dict[str, Rea
     assert line.distance(shapely.Point(exit_[-1])) < 0.3
 
 
-def test_change_of_lanes__lanes_that_leave_the_route_end_at_their_edge(nets: dict[str, Read]) -> None:
-    table = nets["change of lanes"].table("in", "middle", "left")
-    row = np.flatnonzero(np.isfinite(table.lane_offset_m).sum(1) == 3)[20]
-    first, second, third = table.lane_end_m[row]
-    assert first == second
-    assert third == np.inf
-    end = shapely.Point(network.lane_line(nets["change of lanes"].net.getEdge("middle").getLane(2))[-1])
-    line = shapely.LineString(np.stack((table.x_m, table.y_m), axis=1))
-    assert first == pytest.approx(line.project(end) - MARGIN_M, abs=0.5)
-
-
 def test_junction__lanes_stay_side_by_side_inside(build_net: Build) -> None:
     places = (("a", 0, 0), ("b", 80, 0), ("c", 160, 0), ("d", 80, 80))
     nodes = "".join(f'<node id="{name}" x="{x}" y="{y}"/>' for name, x, y in places)
@@ -293,14 +282,6 @@ def test_goal__is_at_its_position_on_its_edge(nets: dict[str, Read], name: str) 
     lane = nets[name].net.getLane("cn_0")  # SUMO's lane length may differ from its shape
     goal = shapely.LineString(network.lane_line(lane)).interpolate(25.0 / lane.getLength(), normalized=True)
     assert goal.distance(shapely.Point(table.x_m[row], table.y_m[row])) < 0.6
-
-
-def test_route__has_no_sidewalks(nets: dict[str, Read]) -> None:
-    read = nets["crossing with sidewalks"]
-    assert len(read.net.getEdge("nc").getLanes()) == 2  # a lane and a sidewalk
-    table = read.table("nc", "cs")
-    row = stations(table).searchsorted(20.0)
-    assert np.isfinite(table.lane_offset_m[row]).sum() == 1
 
 
 # --- bicycle lanes, pavements, bridges and distant roads --------------------------------------------------------------
@@ -379,3 +360,72 @@ def test_area__ends_some_way_from_the_players_routes_where_roads_stay_open(build
     assert not area.intersects(shapely.LineString([(810.0, -1.6), (1199.0, -1.6)]))
     rails = shapely.MultiLineString(network.rail_lines(net, area, own))
     assert not rails.intersects(shapely.box(0.0, -2.6, 1200.0, -0.6))  # no wall across the road where the area ends
+
+
+# --- the marks between own and oncoming lanes: offsets from the leftmost own lane, positive to the left ---------------
+
+IN_A_ROW = "".join(f'<node id="{name}" x="{x}" y="0"/>' for name, x in (("a", 0), ("b", 100), ("c", 200)))
+
+
+def road_edge(name: str, start: str, end: str, lanes: int = 1, **more: str) -> str:
+    extra = "".join(f' {key}="{value}"' for key, value in more.items())
+    return f'<edge id="{name}" from="{start}" to="{end}" numLanes="{lanes}" speed="13.9"{extra}/>'
+
+
+def on_net(net_file: Path, *names: str) -> Route:
+    return Read(network.read_net(net_file)).table(*names, goal_position_m=20.0)
+
+
+def marks(route: Route, station_m: float) -> tuple[float, float]:
+    """The left and the right mark at a station."""
+    row = round((station_m + MARGIN_M) / SPACING_M)
+    return float(route.own_left_m[row]), float(route.own_right_m[row])
+
+
+def two_way(build_net: Build, *options: str, lanes: int = 1) -> Route:
+    edges = (
+        road_edge("ab", "a", "b", lanes)
+        + road_edge("bc", "b", "c", lanes)
+        + road_edge("ba", "b", "a")
+        + road_edge("cb", "c", "b")
+    )
+    return on_net(build_net(IN_A_ROW, edges, "", *options), "ab", "bc")
+
+
+@pytest.mark.parametrize("lanes", [1, 2])
+def test_marks__where_traffic_keeps_to_the_right_are_on_the_left(build_net: Build, lanes: int) -> None:
+    road = two_way(build_net, lanes=lanes)
+    # the route is on the leftmost lane: half a lane to the mark, however many lanes there are to the right
+    assert marks(road, 50.0) == pytest.approx((1.6, -np.inf))
+    assert marks(road, 150.0) == pytest.approx((1.6, -np.inf))
+
+
+def test_marks__where_traffic_keeps_to_the_left_are_on_the_right(build_net: Build) -> None:
+    assert marks(two_way(build_net, "--lefthand", "true"), 50.0) == pytest.approx((np.inf, -1.6))
+
+
+def test_marks__of_a_one_way_road_there_are_none(build_net: Build) -> None:
+    road = on_net(build_net(IN_A_ROW, road_edge("ab", "a", "b", 2) + road_edge("bc", "b", "c", 2)), "ab", "bc")
+    assert np.isinf(road.own_left_m).all()
+    assert np.isinf(road.own_right_m).all()
+
+
+def test_marks__beyond_a_reservation_there_are_none(build_net: Build) -> None:
+    """The carriageways are 8 m apart: oncoming lanes are not next to the own ones."""
+    apart = road_edge("ab", "a", "b", shape="0,0 100,0") + road_edge("ba", "b", "a", shape="100,8 0,8")
+    road = on_net(build_net(IN_A_ROW, apart + road_edge("bc", "b", "c")), "ab", "bc")
+    assert marks(road, 50.0) == (np.inf, -np.inf)
+
+
+def test_marks__end_at_the_junction(build_net: Build) -> None:
+    """The road b-d leaves towards the north: inside the junction there is no mark."""
+    nodes = IN_A_ROW + '<node id="d" x="100" y="100"/>'
+    edges = "".join(road_edge(name, name[0], name[1]) for name in ("ab", "ba", "bc", "cb", "bd", "db"))
+    road = on_net(build_net(nodes, edges), "ab", "bd")
+    assert marks(road, 50.0) == pytest.approx((1.6, -np.inf))
+    along = stations(road)
+    inside = np.isinf(road.own_left_m) & (along > 0.0) & (along < road.length_m)
+    assert inside.any()
+    places: FloatArray = np.stack((road.x_m, road.y_m), axis=1)[inside]
+    assert np.hypot(*(places - [100.0, 0.0]).T).max() < 20.0, "only around the junction at (100, 0)"
+    assert marks(road, road.length_m - 30.0) == pytest.approx((1.6, -np.inf))

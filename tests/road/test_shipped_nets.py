@@ -22,15 +22,6 @@ def label(path: Path) -> str:
     return f"{path.parent.name}/{path.name}"
 
 
-def check(path: Path) -> None:
-    found = survey(path, routes=10)
-    assert not found.crashed
-    assert not found.phantom
-    expected = FOR_OTHERS.get(label(path))
-    assert found.refused == (f"has no lane that cars may use: its lanes are for {expected}" if expected else "")
-    assert expected or found.paths > 0
-
-
 def test_shipped_nets__are_found() -> None:
     assert len(NETS) >= 28, sumo.SUMO_HOME
     assert {label(path) for path in NETS} >= set(FOR_OTHERS)
@@ -38,4 +29,9 @@ def test_shipped_nets__are_found() -> None:
 
 @pytest.mark.parametrize("path", NETS, ids=label)
 def test_shipped_nets__every_one_opens_and_has_no_phantom_rail(path: Path) -> None:
-    check(path)
+    found = survey(path, routes=10)
+    assert not found.crashed
+    assert not found.phantom
+    expected = FOR_OTHERS.get(label(path))
+    assert found.refused == (f"has no lane that cars may use: its lanes are for {expected}" if expected else "")
+    assert expected or found.paths > 0
