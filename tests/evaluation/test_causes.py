@@ -91,12 +91,31 @@ def test_reaction__braking_earlier_is_none(merge: Any) -> None:
     assert cause(merge, ego(poses=poses), rows("non_ego", other)).reaction == "no reaction"
 
 
-def test_crossing__from_the_right_on_foot_and_by_car(merge: Any) -> None:
-    north = along(40.0, -9.8, NORTH, 2.0, STEPS)
-    assert cause(merge, ego(), rows("non_ego", north)).deed == "crosses the ego's way from the right"
-    assert cause(merge, ego(), rows("walker", north, "foot")).deed == (
-        "background traffic: walks into the ego's lane from the right"
-    )
+NORTHBOUND = along(40.0, -9.8, NORTH, 2.0, STEPS)
+BRAKING = [(41.0 + 0.2 * k, -4.8, 0.0, 2.0 if k < 10 else 1.0) for k in range(STEPS)]
+
+
+@pytest.mark.parametrize(
+    ("other", "deed"),
+    [
+        (rows("non_ego", NORTHBOUND), "crosses the ego's way from the right"),
+        (rows("walker", NORTHBOUND, "foot"), "background traffic: walks into the ego's lane from the right"),
+        (rows("non_ego", along(65.0, -4.8, 2 * NORTH, 10.0, STEPS)), "comes towards the ego in its lane"),
+        (rows("non_ego", along(41.0, -4.8, 0.0, 2.0, STEPS)), "drives ahead of the ego"),
+        (rows("non_ego", along(39.0, -4.8, 0.0, 1.0, STEPS), "foot"), "walks ahead of the ego"),
+        (rows("non_ego", BRAKING), "brakes ahead of the ego"),
+        (rows("non_ego", along(44.0, -4.8, 0.0, 0.0, STEPS)), "stands in the ego's lane"),
+        (rows("non_ego", along(-4.0, -4.8, 0.0, 20.0, STEPS)), "hits the ego from behind"),
+    ],
+)
+def test_deed__of_the_other_road_user(other: list[dict[str, Any]], deed: str, merge: Any) -> None:
+    assert cause(merge, ego(), other).deed == deed
+
+
+def test_oncoming__the_danger_lasts_from_the_start(merge: Any) -> None:
+    # the centres are 45 m apart and close at 20 m/s: 40 m between the bumpers, so danger in all 2 s
+    oncoming = rows("non_ego", along(65.0, -4.8, 2 * NORTH, 10.0, STEPS))
+    assert cause(merge, ego(), oncoming).time_left_s == 2.0
 
 
 def test_hidden__behind_a_van_until_it_is_past_it(merge: Any) -> None:
@@ -108,25 +127,6 @@ def test_hidden__behind_a_van_until_it_is_past_it(merge: Any) -> None:
     assert found is not None
     assert found.ego_saw == "yes"
     assert 0.0 < found.hidden_until_s < found.time_left_s
-
-
-def test_oncoming__in_the_ego_s_lane(merge: Any) -> None:
-    found = cause(merge, ego(), rows("non_ego", along(65.0, -4.8, 2 * NORTH, 10.0, STEPS)))
-    # the centres are 45 m apart and close at 20 m/s: 40 m between the bumpers, so danger in all 2 s
-    assert (found.deed, found.time_left_s) == ("comes towards the ego in its lane", 2.0)
-
-
-def test_in_lane__ahead_and_behind(merge: Any) -> None:
-    ahead = rows("non_ego", along(41.0, -4.8, 0.0, 2.0, STEPS))
-    assert cause(merge, ego(), ahead).deed == "drives ahead of the ego"
-    on_foot = rows("non_ego", along(39.0, -4.8, 0.0, 1.0, STEPS), "foot")
-    assert cause(merge, ego(), on_foot).deed == "walks ahead of the ego"
-    braking = [(41.0 + 0.2 * k, -4.8, 0.0, 2.0 if k < 10 else 1.0) for k in range(STEPS)]
-    assert cause(merge, ego(), rows("non_ego", braking)).deed == "brakes ahead of the ego"
-    standing = rows("non_ego", along(44.0, -4.8, 0.0, 0.0, STEPS))
-    assert cause(merge, ego(), standing).deed == "stands in the ego's lane"
-    behind = rows("non_ego", along(-4.0, -4.8, 0.0, 20.0, STEPS))
-    assert cause(merge, ego(), behind).deed == "hits the ego from behind"
 
 
 def test_ego__that_changes_into_the_other_s_lane(merge: Any) -> None:
@@ -151,43 +151,26 @@ def test_goal__has_no_cause(merge: Any) -> None:
 
 
 def table(*causes: dict[str, Any]) -> pd.DataFrame:
-    common = {"arm": "a", "persona": "p", "seed": 1, "ego_outcome": "collision", "other": "non_ego", "time_s": 1.0}
-    usual = {
-        "event": "cut_in",
-        "deed": "cuts in from the left",
-        "time_left_s": 0.4,
-        "ego_saw": "yes",
-        "reaction": "no reaction",
-    }
-    rest = {"braking_mps2": 0.3, "ego_broke": "", "hidden_until_s": math.nan}
-    games = [{**common, **usual, **rest, **each, "episode": k} for k, each in enumerate(causes)]
-    return table_of("causes", games)
+    usual = {"arm": "a", "persona": "p", "seed": 1, "ego_outcome": "collision", "other": "non_ego", "time_s": 1.0}
+    usual |= {"event": "cut_in", "deed": "cuts in from the left", "time_left_s": 0.4, "ego_saw": "yes"}
+    usual |= {"reaction": "no reaction", "braking_mps2": 0.3, "ego_broke": "", "hidden_until_s": math.nan}
+    return table_of("causes", [{**usual, **each, "episode": k} for k, each in enumerate(causes)])
 
 
-def test_lines__say_how_many_what_how_long_and_what_the_ego_did() -> None:
-    games = table({}, {"time_left_s": 0.9, "braking_mps2": 0.7}, {"deed": "brakes ahead of the ego", "ego_saw": "no"})
-    assert cause_lines(games) == [
-        "2 of 3: cuts in from the left, 0.4 to 0.9 s before contact; the ego sees it, no reaction "
-        "(braking up to 0.7 m/s²)",
-        "1 of 3: brakes ahead of the ego, 0.4 s before contact; the ego does not see it, no reaction "
-        "(braking up to 0.3 m/s²)",
-    ]
-
-
-def test_lines__count_several_reactions_and_name_a_rule_that_the_ego_broke() -> None:
-    games = table({}, {}, {"reaction": "brakes", "braking_mps2": 5.0, "ego_saw": "no"})
-    assert cause_lines(games.assign(ego_broke="runs a red light")) == [
-        "3 of 3: cuts in from the left, 0.4 s before contact; the ego runs a red light; the ego sees it in 2: "
-        "no reaction in 2, brakes in 1 (braking up to 5.0 m/s²)"
-    ]
-
-
-def test_lines__say_until_when_the_other_was_hidden() -> None:
-    games = table({"hidden_until_s": 0.8}, {"hidden_until_s": 0.6}, {})
-    assert cause_lines(games) == [
-        "3 of 3: cuts in from the left, 0.4 s before contact; hidden from the ego until 0.6 to 0.8 s before (in 2); "
-        "the ego sees it, no reaction (braking up to 0.3 m/s²)"
-    ]
+@pytest.mark.parametrize(
+    ("causes", "words"),
+    [
+        ([{}, {"time_left_s": 0.9}], ["2 of 2: cuts in from the left", "0.4 to 0.9 s", "the ego sees it, no reaction"]),
+        ([{"ego_saw": "no"}], ["does not see it"]),
+        ([{}, {"braking_mps2": 0.7}], ["braking up to 0.7 m/s²"]),
+        ([{}, {}, {"reaction": "brakes", "ego_saw": "no"}], ["sees it in 2", "no reaction in 2", "brakes in 1"]),
+        ([{"ego_broke": "runs a red light"}], ["the ego runs a red light"]),
+        ([{"hidden_until_s": 0.8}, {"hidden_until_s": 0.6}, {}], ["hidden", "until 0.6 to 0.8 s before", "(in 2)"]),
+    ],
+)
+def test_lines__say_how_many_what_how_long_and_what_the_ego_did(causes: list[dict[str, Any]], words: list[str]) -> None:
+    (line,) = cause_lines(table(*causes))
+    assert [each for each in words if each not in line] == []
 
 
 def test_lines__of_many_kinds_the_rest_is_counted() -> None:

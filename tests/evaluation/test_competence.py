@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pandas as pd
 import pytest
 
@@ -73,23 +75,14 @@ def test_goals__are_counted_over_the_games_that_could_be_played() -> None:
     assert goals_alone(None, "ego") == Goals(goals=0, played=0)
 
 
-def test_goals__of_an_ego_on_red_do_not_count() -> None:
-    games = arm("naive_alone", ego=["goal", "goal", "goal", "rail"]).assign(ego_red_lights=[0.0, 1.0, None, 2.0])
-    goals = goals_alone(games, "ego")
-    assert goals == Goals(goals=2, played=4, on_red=1)
-    assert goals.below(0.97) == (
-        "alone it reaches its goal in 2 of 4 games (50 %), and in 1 more after passing a red light, below 97 %"
-    )
-
-
-def test_goals__of_an_ego_among_oncoming_lanes_do_not_count() -> None:
-    games = arm("naive_alone", ego=["goal", "goal", "goal", "rail"]).assign(
-        ego_red_lights=[0.0, 1.0, 0.0, 0.0], ego_wrong_way_s=[0.9, 3.0, 1.0, 8.0]
+def test_goals__of_an_ego_on_red_or_among_oncoming_lanes_do_not_count() -> None:
+    games = arm("naive_alone", ego=["goal", "goal", "goal", "goal", "rail"]).assign(
+        ego_red_lights=[0.0, 1.0, 0.0, None, 2.0], ego_wrong_way_s=[0.9, 3.0, 1.0, None, 8.0]
     )
     goals = goals_alone(games, "ego")
-    assert goals == Goals(goals=1, played=4, on_red=1, wrong_way=1)
+    assert goals == Goals(goals=2, played=5, on_red=1, wrong_way=1)
     assert goals.below(0.97) == (
-        "alone it reaches its goal in 1 of 4 games (25 %), and in 1 more after passing a red light, "
+        "alone it reaches its goal in 2 of 5 games (40 %), and in 1 more after passing a red light, "
         "and in 1 more after driving among oncoming lanes, below 97 %"
     )
     assert Goals.recorded(goals.record()) == goals
@@ -118,15 +111,11 @@ def test_goals__a_share_below_its_bound_is_never_shown_as_the_bound() -> None:
     ],
 )
 def test_gate__names_who_cannot_drive(ego: int, person: int, verdict: str) -> None:
-    assert gate(RQ1.alone, 1, games_by_arm(table(ego, person))).verdict == verdict
-
-
-def test_gate__the_reason_has_the_player_its_share_and_the_bound() -> None:
-    closed = gate(RQ1.alone, 1, games_by_arm(table(100, 3)))
-    assert closed.verdict == "not answered: the person can't drive this scene"
-    assert closed.reason == (
-        "the speedy driver can't drive this scene: alone it reaches its goal in 3 of 100 games (3 %), below 80 %"
-    )
+    found = gate(RQ1.alone, 1, games_by_arm(table(ego, person)))
+    assert found.verdict == verdict
+    share = Goals(goals=person, played=100).below(0.8)
+    assert ("the naive ego can't drive this scene" in found.reason) == (ego < 97)
+    assert (f"the speedy driver can't drive this scene: {share}" in found.reason) == (person < 80)
 
 
 def test_gate__players_that_were_not_played_alone_are_not_taken_on_trust() -> None:
@@ -169,14 +158,8 @@ def test_compare__the_failures_of_a_person_that_cannot_drive_are_no_answer() -> 
 def test_compare__unanswered_questions_are_not_in_holms_family() -> None:
     mild = arm("naive_vs_bert", ego=["rail"] * 5 + ["goal"] * 25, non_ego=["goal"] * 30)
     alone = arm("bert_alone", non_ego=["goal"] * 30)
-    asked = Question(
-        question="RQ1",
-        persona="bert",
-        seed=1,
-        baseline="naive_alone",
-        treatment="naive_vs_bert",
-        alone=(EGO, AloneBound(player="non_ego", words="the bert driver", arm="bert_alone", goal_share=0.8)),
-    )
+    bert = replace(PERSON, words="the bert driver", arm="bert_alone")
+    asked = replace(RQ1, persona="bert", treatment="naive_vs_bert", alone=(EGO, bert))
     episodes = pd.concat([table(30, 0, of=30), mild, alone], ignore_index=True)
     with_it = [row for row in compared(episodes, RQ1, asked) if row["persona"] == "bert"]
     pd.testing.assert_frame_equal(pd.DataFrame(with_it), pd.DataFrame(compared(episodes, asked)))

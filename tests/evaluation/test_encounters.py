@@ -86,15 +86,17 @@ def test_encounter__passages_of_both_sides_and_the_time_between_them(world: Worl
     assert found.post_encroachment_s == pytest.approx(3.9 - 3.61)
 
 
-def test_encounter__the_other_may_be_first(world: World) -> None:
-    (found,) = met(world, ego(60.0), northbound(-10.0))
-    assert found.other is not None
-    assert found.post_encroachment_s == pytest.approx((98.5 - 62.3) / 10.0 - 1.23)
-
-
-def test_encounter__both_inside_at_once_is_no_time_between_them(world: World) -> None:
-    (found,) = met(world, ego(), northbound(-34.0))
-    assert found.post_encroachment_s == 0.0
+@pytest.mark.parametrize(
+    ("cars", "times_s"),
+    [
+        ([ego(60.0), northbound(-10.0)], [(98.5 - 62.3) / 10.0 - 1.23]),  # the other is first
+        ([ego(), northbound(-34.0)], [0.0]),  # both are inside at once
+        ([ego(), driving("non_ego", 130.0, -44.0, NORTH)], []),  # the other crosses elsewhere
+        ([ego(20.0, speed_mps=5.0), northbound(-44.3)], []),  # the ego does not get there
+    ],
+)
+def test_encounter__time_between_the_passages(cars: list[pd.DataFrame], times_s: list[float], world: World) -> None:
+    assert [each.post_encroachment_s for each in met(world, *cars)] == pytest.approx(times_s)
 
 
 def test_encounter__a_body_that_stops_before_the_zone_is_not_passed(world: World) -> None:
@@ -105,19 +107,11 @@ def test_encounter__a_body_that_stops_before_the_zone_is_not_passed(world: World
     assert min_pet_s(series([found])) is None
 
 
-def test_encounter__none_with_a_body_that_crosses_elsewhere(world: World) -> None:
-    assert met(world, ego(), driving("non_ego", 130.0, -44.0, NORTH)) == []
-
-
 def test_encounter__none_with_a_body_that_leaves_the_stream_before_the_zone(world: World) -> None:
     turning = northbound(-44.3)
     away = turning["step"] >= 36  # its front is 3 m before the zone
     turning.loc[away, "x_m"] += 3.0
     assert met(world, ego(), turning) == []
-
-
-def test_encounter__none_for_a_player_that_does_not_get_there(world: World) -> None:
-    assert met(world, ego(20.0, speed_mps=5.0), northbound(-44.3)) == []
 
 
 def test_encounter__with_background_traffic(world: World) -> None:
@@ -152,24 +146,27 @@ def test_priority__by_the_signals_of_the_trace(world: World, lights: str, must_y
 # --- manoeuvres ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("y_m", "gap_s"), [(-44.3, 1.0), (-64.3, 3.0), (-65.3, None)])
-def test_fails_to_yield__to_a_road_user_that_is_at_most_3_s_away(world: World, y_m: float, gap_s: float | None) -> None:
-    found = named(world, ego(), northbound(y_m))
-    assert [each.manoeuvre for each in found] == (["fails_to_yield"] if gap_s else [])
-    if gap_s:
-        assert found[0].text == f"does not yield to traffic, {gap_s:.1f} s away"
-        assert (found[0].time_s, found[0].until_s) == (pytest.approx(2.9), pytest.approx(3.6))
+@pytest.mark.parametrize(
+    ("conflict", "y_m", "names"),
+    [
+        ({}, -64.3, ["fails_to_yield"]),  # 3.0 s away
+        ({}, -65.3, []),
+        ({"yields": False}, -44.3, []),
+        ({"across": True}, -75.3, ["turns_across"]),  # 4.1 s away
+        ({"across": True}, -76.3, []),
+    ],
+)
+def test_gap__that_is_too_short_is_named(
+    conflict: dict[str, Any], y_m: float, names: list[str], merge: OpenScene
+) -> None:
+    world = with_conflicts(merge.world, {**CROSSING, **conflict})
+    assert [each.manoeuvre for each in named(world, ego(), northbound(y_m))] == names
 
 
-def test_fails_to_yield__not_with_priority(merge: OpenScene) -> None:
-    major = with_conflicts(merge.world, {**CROSSING, "yields": False})
-    assert named(major, ego(), northbound(-44.3)) == []
-
-
-@pytest.mark.parametrize(("y_m", "names"), [(-75.3, ["turns_across"]), (-76.3, [])])
-def test_turns_across__in_a_gap_of_at_most_4_1_s(merge: OpenScene, y_m: float, names: list[str]) -> None:
-    turning = with_conflicts(merge.world, {**CROSSING, "across": True})
-    assert [each.manoeuvre for each in named(turning, ego(), northbound(y_m))] == names
+def test_fails_to_yield__has_its_gap_begin_and_end(world: World) -> None:
+    (found,) = named(world, ego(), northbound(-44.3))
+    assert found.text == "does not yield to traffic, 1.0 s away"
+    assert (found.time_s, found.until_s) == (pytest.approx(2.9), pytest.approx(3.6))
 
 
 def lines(merge: OpenScene, control: Control) -> World:

@@ -11,9 +11,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from harness.assessment.rollout import SeatedArm, assess
-from harness.config.persona import Persona
-from harness.config.toml_reading import read_document
 from harness.evaluation.recorded_game import BodyKind
 from harness.evaluation.rule_book import thresholds
 from harness.evaluation.rule_book.cause_lines import event_words
@@ -22,8 +19,9 @@ from harness.evaluation.rule_book.course import Course
 from harness.evaluation.rule_book.named_manoeuvres import NAMES, Manoeuvre, find_manoeuvres
 from harness.game.arrays import FloatArray, IntArray
 from harness.road.scene.open_scene import OpenScene
-from tests.support.rollouts import seated
+from tests.support.rollouts import Steady, arm, play
 from tests.support.scenes import LEFT_Y, RIGHT_Y, STRAIGHT, STRAIGHT_NODES, build_scene
+from tests.support.tiny import DISTRACTED
 from tests.support.traces import game, rows
 
 STEP_S = 0.1
@@ -115,16 +113,16 @@ def test_cut_in__only_within_the_stated_gap_or_time_to_collision(
     assert bool(only(named(merge, *cutting_in(gap_m, speed_mps)), "non_ego", "cut_in")) == cuts_in
 
 
-def test_cut_in__not_by_a_leader_while_the_other_moves_over(merge: OpenScene) -> None:
-    cars = [car("ego", 5.0, across(ENDING_Y, THROUGH_Y, 15, 35)), car("non_ego", 18.0)]
-    found = named(merge, *cars)
-    assert not only(found, "non_ego", "cut_in")
-    assert not only(found, "ego", "cut_in")  # it enters behind
-
-
-@pytest.mark.parametrize("ahead_m", [0.5, 30.0])
-def test_cut_in__not_by_a_player_in_the_path_from_the_start(ahead_m: float, merge: OpenScene) -> None:
-    assert not only(named(merge, car("ego", 5.0), car("non_ego", 5.0 + LENGTH_M + ahead_m)), "non_ego", "cut_in")
+@pytest.mark.parametrize(
+    "cars",
+    [
+        [car("ego", 5.0, across(ENDING_Y, THROUGH_Y, 15, 35)), car("non_ego", 18.0)],  # the ego enters behind
+        [car("ego", 5.0), car("non_ego", 5.0 + LENGTH_M + 0.5)],  # in the path from the start
+        [car("ego", 5.0), car("non_ego", 5.0 + LENGTH_M + 30.0)],
+    ],
+)
+def test_cut_in__not_by_a_leader(cars: list[pd.DataFrame], merge: OpenScene) -> None:
+    assert "cut_in" not in [each.manoeuvre for each in named(merge, *cars)]
 
 
 # --- hard_brake -------------------------------------------------------------------------------------------------------
@@ -147,9 +145,7 @@ def test_hard_brake__by_deceleration_and_duration(
     assert len(found) == expected
     if found:
         assert (found[0].time_s, found[0].until_s) == (pytest.approx(2.1), pytest.approx(2.0 + steps * STEP_S))
-        assert found[0].text == f"brakes at up to {deceleration_mps2:.1f} m/s²"
-        assert np.isnan(found[0].gap_m)
-        assert np.isnan(found[0].ttc_s)
+        assert np.isnan([found[0].gap_m, found[0].ttc_s]).all()
 
 
 def test_hard_brake__a_short_pause_does_not_split_it(straight: OpenScene) -> None:
@@ -210,21 +206,25 @@ def test_swerve__following_a_bend_is_not_one(tmp_path: Path) -> None:
 # --- drift ------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("moved_m", "drifts"), [(0.52, True), (0.48, False), (0.0, False), (-0.52, True)])
-def test_drift__a_lapse_in_which_the_car_moves_sideways(moved_m: float, drifts: bool, straight: OpenScene) -> None:
-    y = across(RIGHT_Y, RIGHT_Y + moved_m, 9, 40)
+@pytest.mark.parametrize(
+    ("begin_m", "moved_m", "drifts"),
+    [
+        (0.0, 0.52, True),
+        (0.0, 0.48, False),
+        (0.0, 0.0, False),
+        (0.0, -0.52, True),
+        (1.2, 1.2, True),  # over into the next lane; 1.6 m is half way
+    ],
+)
+def test_drift__a_lapse_in_which_the_car_moves_sideways(
+    begin_m: float, moved_m: float, drifts: bool, straight: OpenScene
+) -> None:
+    y = across(RIGHT_Y + begin_m, RIGHT_Y + begin_m + moved_m, 9, 40)
     found = only(named(straight, car("non_ego", 20.0, y, lapsed=(10, 41))), "non_ego", "drift")
     assert len(found) == drifts
     if found:
-        side = "left" if moved_m > 0 else "right"
         assert (found[0].time_s, found[0].until_s) == (1.0, 4.0)
-        assert found[0].text == f"drifts {abs(moved_m):.1f} m to the {side} in a lapse of attention"
-
-
-def test_drift__over_into_the_next_lane_is_one_movement(straight: OpenScene) -> None:
-    y = across(RIGHT_Y + 1.2, RIGHT_Y + 2.4, 9, 40)  # 1.6 m is half way
-    (found,) = only(named(straight, car("non_ego", 20.0, y, lapsed=(10, 41))), "non_ego", "drift")
-    assert "1.2 m to the left" in found.text
+        assert f"{abs(moved_m):.1f} m to the {'left' if moved_m > 0 else 'right'}" in found[0].text
 
 
 def test_drift__steered_movement_is_not_one(straight: OpenScene) -> None:
@@ -318,7 +318,6 @@ def test_tailgate__by_time_gap_duration_and_speed(
     assert len(found) == tailgates
     if found:
         assert found[0].gap_m == pytest.approx(gap_m, abs=0.3)
-        assert found[0].text == f"follows as close as {time_gap_s:.1f} s" or time_gap_s == 0.95
 
 
 # --- forced_stop ------------------------------------------------------------------------------------------------------
@@ -373,39 +372,32 @@ def test_find__ends_with_the_egos_game(straight: OpenScene) -> None:
 # --- the paper's figure 4, played -------------------------------------------------------------------------------------
 
 
-class Scripted:
+class Scripted(Steady):
     """Steers by a script, step by step, with constant speed."""
 
-    takes_over = True
-
     def __init__(self, wheel: Sequence[float]) -> None:
-        self._wheel, self._step = wheel, 0
+        super().__init__()
+        self._wheel, self._left = wheel, list(wheel)
 
     def reset(self, games: IntArray) -> None:
-        self._step = 0
+        self._left = list(self._wheel)
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
-        wheel = self._wheel[min(self._step, len(self._wheel) - 1)]
-        self._step += 1
-        return np.tile([0.0, wheel], (len(games), 1))
+        self._action = (0.0, self._left.pop(0) if len(self._left) > 1 else self._left[0])
+        return super().decide(games, observation, noise)
 
 
-def test_paper__a_distracted_drift_an_egos_swerve_and_the_rail(repository: Path, merge: OpenScene) -> None:
+def test_paper__a_distracted_drift_an_egos_swerve_and_the_rail(merge: OpenScene) -> None:
     """Figure 4: the non-ego "enters a distracted state as their vehicle is drifting sideways"; the ego "swerves away
     and collides with the guard rail"."""
-    careful, distracted = (
-        read_document(repository / "personas" / f"{name}.toml", Persona) for name in ("careful", "distracted")
-    )
-    drivers = (Scripted([0.0] * 30 + [0.9] * 10), Scripted([0.0]))
-    arm = SeatedArm(name="naive_vs_distracted", scene=merge, drivers=seated(drivers, (careful, distracted)), seed=1)
-    stories = {}
-    for played in assess(arm, 12):
+    drivers = Scripted([0.0] * 30 + [0.9] * 10), Steady()
+    stories = set()
+    for played in play(arm(merge, *drivers, persona=DISTRACTED), episodes=12):
         assert played.recorded is not None
         cause = cause_of(Course(game=played.recorded))
         if cause is not None:
-            outcome = played.record["ego_outcome"]
-            stories[played.record["episode"]] = f"{event_words(cause.event)} -> {cause.reaction} -> {outcome}"
-    assert "drift -> swerves -> rail" in stories.values(), stories
+            stories.add(f"{event_words(cause.event)} -> {cause.reaction} -> {played.record['ego_outcome']}")
+    assert "drift -> swerves -> rail" in stories
 
 
 # --- the page about them ----------------------------------------------------------------------------------------------

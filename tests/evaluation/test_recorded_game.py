@@ -63,11 +63,3 @@ def test_bodies__names_kinds_and_the_nearest_by_the_distance_of_boxes(merge: Ope
     # the ego's front is at 22.5 m, the truck's rear at 27 m (centre 33), the obstacle's at 28.5 m (centre 31)
     assert found.nearest(0, 0) == 2
     assert found.nearest(0, 2) == 3
-
-
-def test_station__is_exact_where_a_route_meets_itself(merge: OpenScene) -> None:
-    """The station is that of the log, not the nearest one."""
-    trace = drawn(ego=([20.0, 21.0], 10.0, -1.6, {}))
-    found = game(merge.world, trace)
-    station = found.trace.loc[found.trace["player"] == "ego", "station_m"].to_numpy()
-    assert found.quantities.state.station_m[:, 0] == pytest.approx(station, abs=0.5)

@@ -11,32 +11,14 @@ import pytest
 
 from harness.evaluation import trace_file
 from harness.evaluation.trace_file import SCHEMA, TraceReader, join_traces, read_trace, trace_writer
+from tests.support.traces import along, rows
 
 
 def game(episode: int, steps: int = 3) -> dict[str, list[Any]]:
-    rows = range(steps)
-    return {
-        "episode": [episode] * steps,
-        "step": list(rows),
-        "time_s": [0.1 * k for k in rows],
-        "player": ["ego"] * steps,
-        "vehicle_type": ["car"] * steps,
-        "x_m": [1 / 3 + k for k in rows],
-        "y_m": [-1.6] * steps,
-        "heading_rad": [0.1] * steps,
-        "speed_mps": [10.0] * steps,
-        "acceleration_mps2": [0.0] * steps,
-        "steering_rad": [0.01] * steps,
-        "lapsed": [k == 1 for k in rows],
-        "steers": [True] * steps,
-        "station_m": [20.0 + k for k in rows],
-        "payoff": [0.25] * steps,
-        "outcome": [""] * (steps - 1) + ["goal"],
-        "signals": ["crossing=Gr"] * (steps - 1) + ["crossing=yr"],
-        "signal_s": ["4.5 0.0"] + [""] * (steps - 1),
-        "friction": [0.9] * steps,
-        "limit_share": [1.0] * steps,
-    }
+    driven = pd.DataFrame(rows("ego", along(1 / 3, -1.6, 0.1, 10.0, steps), end="goal", lapsed=[1]))
+    driven = driven.assign(episode=episode, steers=True, station_m=20.0 + driven["step"], payoff=0.25, friction=0.9)
+    signals, signal_s = ["crossing=Gr"] * (steps - 1) + ["crossing=yr"], ["4.5 0.0"] + [""] * (steps - 1)
+    return driven.assign(signals=signals, signal_s=signal_s, limit_share=1.0)[SCHEMA.names].to_dict("list")
 
 
 def write(path: Path, *games: dict[str, list[Any]]) -> None:

@@ -29,17 +29,13 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
     return merge_with_vans(tmp_path_factory.mktemp("scene") / "merge")
 
 
-def schema(version: str) -> xmlschema.XMLSchema:
-    spec = find_spec("qc_openscenario")
-    assert spec is not None, "asam-qc-openscenarioxml is not installed"
-    return xmlschema.XMLSchema(str(Path(str(spec.origin)).parent / "schema" / version / "OpenSCENARIO.xsd"))
-
-
 @pytest.fixture(scope="module")
 def mistakes() -> Valid:
     """`mistakes(document)`: what ASAM's schema of the written version says against it."""
-    of_version = schema("1.2.0")
-    return lambda document: [str(error.reason) for error in of_version.iter_errors(io.BytesIO(document))]
+    spec = find_spec("qc_openscenario")
+    assert spec is not None, "asam-qc-openscenarioxml is not installed"
+    schema = xmlschema.XMLSchema(str(Path(str(spec.origin)).parent / "schema" / "1.2.0" / "OpenSCENARIO.xsd"))
+    return lambda document: [str(error.reason) for error in schema.iter_errors(io.BytesIO(document))]
 
 
 def root_of(document: bytes) -> ElementTree.Element:
@@ -92,19 +88,23 @@ def test_heading__does_not_jump_by_a_turn(scene: OpenScene) -> None:
     assert np.abs(np.diff(course[:, 3])).max() == pytest.approx(0.2, abs=1e-5)
 
 
+def actions(root: ElementTree.Element, kind: str) -> list[tuple[float, ElementTree.Element]]:
+    """The actions of a kind with their times."""
+    return [
+        (float(event.find(".//SimulationTimeCondition").get("value", "nan")), action)  # type: ignore[union-attr]
+        for event in root.iter("Event")
+        for action in event.iter(kind)
+    ]
+
+
 def test_others__appear_and_leave_when_they_did(scene: OpenScene) -> None:
     root = root_of(scenario_file(exported(busy_game(), scene), None))
-    times = {}
-    for event in root.iter("Event"):
-        condition = event.find(".//SimulationTimeCondition")
-        assert condition is not None
-        for action in event.iter("EntityAction"):
-            times.setdefault(action.get("entityRef"), {})[action[0].tag] = float(condition.get("value", "nan"))
-    assert times["flow.0"] == {"AddEntityAction": pytest.approx(1.5), "DeleteEntityAction": pytest.approx(7.45)}
-    assert "AddEntityAction" in times["brief"]
-    assert "ego" not in times
-    placed = {private.get("entityRef") for private in root.iter("Private")}
-    assert placed == {"ego"}
+    times = {(action.get("entityRef"), action[0].tag): time_s for time_s, action in actions(root, "EntityAction")}
+    assert times["flow.0", "AddEntityAction"] == pytest.approx(1.5)
+    assert times["flow.0", "DeleteEntityAction"] == pytest.approx(7.45)
+    assert ("brief", "AddEntityAction") in times
+    assert "ego" not in {name for name, _ in times}
+    assert {private.get("entityRef") for private in root.iter("Private")} == {"ego"}
 
 
 def test_entities__are_of_their_kinds(scene: OpenScene) -> None:
@@ -152,14 +152,9 @@ def test_absence__splits_a_road_user(scene: OpenScene) -> None:
 
 def test_signals__change_when_they_did() -> None:
     root = root_of(scenario_file(exported(*signals_game()), ROAD))
-    changes = {}
-    for event in root.iter("Event"):
-        condition = event.find(".//SimulationTimeCondition")
-        assert condition is not None
-        for action in event.iter("TrafficSignalStateAction"):
-            changes.setdefault(action.get("name"), []).append(
-                (float(condition.get("value", "nan")), action.get("state"))
-            )
+    changes: dict[str | None, list[tuple[float, str | None]]] = {}
+    for time_s, action in actions(root, "TrafficSignalStateAction"):
+        changes.setdefault(action.get("name"), []).append((time_s, action.get("state")))
     red, yellow, green = "on;off;off", "off;on;off", "off;off;on"
     assert changes["4"] == [(0.0, green), (pytest.approx(2.0), yellow), (pytest.approx(5.0), red)]
     assert [state for _, state in changes["1"]] == [red, red, green]

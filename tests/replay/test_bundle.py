@@ -13,7 +13,6 @@ from defusedxml import ElementTree
 from harness.evaluation.worst_first import worst_first
 from harness.replay import choose_games, names_in_pictures
 from harness.replay.contacts import contacts
-from harness.replay.floating_car_data import Lanes
 from harness.replay.gui_settings import choose_view
 from harness.replay.selection import MOST_FAILURES_PER_ARM
 from harness.replay.vehicles import types_of_vehicles
@@ -152,16 +151,6 @@ def test_view__holds_the_players_or_else_the_contact() -> None:
     view = choose_view(drive("ego", straight(10.0, -1.6, 10.0, 20)), [])
     assert view.x_m == pytest.approx(0.5 * (10.0 + 29.0))
     assert view.width_m < 80.0
-
-
-def test_lanes__nearest_lane_and_place_within_its_length(merge_net: Path) -> None:
-    lanes = Lanes.read(merge_net)
-    points = np.array([[50.0, -4.5], [110.0, -1.6], [110.0, -1.6], [-9.0, 8.0], [300.0, -1.6]])
-    starts = np.array([False, False, True, False, False])
-    lane = lanes.locate(points, starts)
-    assert [lanes.ids[row] for row in lane] == ["approach_0", ":taper_0_0", "approach_1", "approach_1", "exit_0"]
-    assert lanes.position(lane, points) == pytest.approx([50.0, 10.0, 100.0, 0.0, 90.0])
-    assert [lanes.ids[row] for row in lanes.onward[lane[:2]]] == ["approach_0", "exit_0"]
 
 
 def episodes() -> pd.DataFrame:

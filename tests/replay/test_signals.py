@@ -6,7 +6,6 @@ from pathlib import Path
 from xml.etree import ElementTree as Xml
 
 import pandas as pd
-import pytest
 from defusedxml import ElementTree
 
 from harness.replay import write_replay
@@ -78,8 +77,3 @@ def test_programmes__one_for_each_light_with_a_phase_for_each_state() -> None:
     assert (first.get("id"), second.get("id")) == ("a=b", "x")
     assert [(each.get("duration"), each.get("state")) for each in first] == [("0.300", "Gr"), ("3600.000", "ry")]
     assert [each.get("state") for each in second] == ["r"]
-
-
-@pytest.mark.parametrize("texts", [[""] * 4, ["nan"] * 4])
-def test_programmes__of_a_scene_without_lights_are_none(texts: list[str]) -> None:
-    assert programmes(drive("ego", straight(0.0, 0.0, 8.0, 4)).assign(signals=texts), STEP_S) == []

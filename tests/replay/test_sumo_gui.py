@@ -84,15 +84,6 @@ def test_gui__shows_both_cars_where_the_trace_has_them(
         assert abs(y_m - expected.loc[player, "y_m"]) < 1.0
 
 
-def test_gui__a_vehicle_that_left_is_gone_and_the_others_stay(screen: str, merge_net: Path, tmp_path: Path) -> None:
-    trace = GAMES["clean"]()
-    leaving, gone, last = photograph(write(trace, merge_net, tmp_path / "replay"), screen, [153, 154, 169])
-    assert blue(leaving).any()
-    assert not blue(gone).any()
-    assert orange(gone).any()
-    assert orange(last).any()
-
-
 def test_gui__follows_the_ego_and_halts_at_the_contact(
     screen: str, merge_net: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

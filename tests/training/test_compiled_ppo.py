@@ -90,41 +90,36 @@ def differences(one: PPO, other: PPO) -> list[float]:
     return [float((a - b).detach().abs().max()) for a, b in tensors]
 
 
+def trained(steps: int, **changes: Any) -> list[PPO]:
+    """Learners of both kinds, trained from the same state."""
+    models = [learner(kind, **changes) for kind in (PPO, CompiledPPO)]
+    for model in models:
+        set_random_seed(2)
+        model.learn(steps)
+    return models
+
+
 # --- from the same state ---
 
 
 @pytest.mark.parametrize(("network", "updates"), [([16, 8], 100), ([16], 10), ([8, 8, 4], 10)], ids=str)
 def test_learn__updates_are_those_of_stable_baselines3(network: list[int], updates: int) -> None:
-    models = [learner(kind, policy_kwargs={"net_arch": network, "log_std_init": -0.7}) for kind in (PPO, CompiledPPO)]
-    before = models[0].policy.state_dict()["mlp_extractor.policy_net.0.weight"].clone()
-    for model in models:
-        set_random_seed(2)
-        model.learn(updates * 64)
+    changes = {"policy_kwargs": {"net_arch": network, "log_std_init": -0.7}}
+    models = trained(updates * 64, **changes)
     assert models[0]._n_updates == models[1]._n_updates == 2 * updates
     assert max(differences(*models)) < 10 * BOUND  # differences of single steps add up
-    moved = models[0].policy.state_dict()["mlp_extractor.policy_net.0.weight"] - before
-    assert float(moved.abs().max()) > 1000 * BOUND
+    before, after = (each.policy.mlp_extractor.policy_net[0].weight for each in (learner(PPO, **changes), models[0]))
+    assert float((after - before).detach().abs().max()) > 1000 * BOUND
 
 
 def test_learn__an_early_stop_by_kl_divergence_is_that_of_stable_baselines3() -> None:
-    models = [learner(kind, target_kl=0.002, n_epochs=10, learning_rate=1e-3) for kind in (PPO, CompiledPPO)]
-    for model in models:
-        set_random_seed(2)
-        model.learn(10 * 64)
+    models = trained(10 * 64, target_kl=0.002, n_epochs=10, learning_rate=1e-3)
     assert models[0]._n_updates == models[1]._n_updates < 100
     assert max(differences(*models)) < 10 * BOUND
 
 
 def test_learn__logs_what_stable_baselines3_logs() -> None:
-    logged = []
-    for kind in (PPO, CompiledPPO):
-        model = learner(kind)
-        set_random_seed(2)
-        model.learn(3 * 64)
-        (writer,) = model.logger.output_formats
-        assert isinstance(writer, Recorded)
-        logged.append(writer.rows)
-    expected, found = logged
+    expected, found = (model.logger.output_formats[0].rows for model in trained(3 * 64))  # type: ignore[attr-defined]
     assert [each.keys() for each in found] == [each.keys() for each in expected]
     for one, other in zip(expected, found, strict=True):
         assert {name: float(value) for name, value in other.items()} == pytest.approx(
@@ -133,26 +128,13 @@ def test_learn__logs_what_stable_baselines3_logs() -> None:
 
 
 def test_learn__the_rollout_is_that_of_stable_baselines3() -> None:
-    buffers = []
-    for kind in (PPO, CompiledPPO):
-        model = learner(kind, learning_rate=0.0)  # the buffer is that of the last rollout
-        set_random_seed(2)
-        model.learn(2 * 64)
-        buffers.append(model.rollout_buffer)
-    for name in [
-        "observations",
-        "actions",
-        "rewards",
-        "episode_starts",
-        "values",
-        "log_probs",
-        "advantages",
-        "returns",
-    ]:
-        one, other = (getattr(each, name).reshape(64, -1) for each in buffers)
+    models = trained(2 * 64, learning_rate=0.0)  # the buffer is that of the last rollout
+    columns = "observations actions rewards episode_starts values log_probs advantages returns"
+    for name in columns.split():
+        one, other = (getattr(each.rollout_buffer, name).reshape(64, -1) for each in models)
         one, other = (np.sort(each, axis=0) for each in (one, other))  # SB3's is in the order of its minibatches
         assert other == pytest.approx(one, abs=10 * BOUND), name
-    assert buffers[1].episode_starts.any()
+    assert models[1].rollout_buffer.episode_starts.any()
 
 
 def test_learn__a_callback_ends_the_rollout() -> None:

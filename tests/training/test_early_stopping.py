@@ -63,23 +63,21 @@ def test_still_fails__by_the_share_of_the_latest_segments(games: list[int], fail
 
 # --- the last part, in which actions become narrow --------------------------------------------------------------------
 
-SETTINGS = Training(steps=100_000, initial_deviation=0.4, max_deviation=0.4, final_deviation=0.1, narrowing_share=0.2)
+SETTINGS = Training(steps=100_000, initial_deviation=0.4, max_deviation=0.4, final_deviation=0.1)
 
 
-@pytest.mark.parametrize(("steps", "bound"), [(0, 0.4), (80_000, 0.4), (90_000, 0.2), (100_000, 0.1), (120_000, 0.1)])
-def test_narrowing__ends_with_the_budget(steps: int, bound: float) -> None:
-    narrowing = Narrowing.of(SETTINGS, converged_at=None)
-    assert (narrowing.start, narrowing.end) == (80_000, 100_000)
-    assert narrowing.largest_deviation(steps) == pytest.approx(bound)  # halfway: by a factor of two, then again
-
-
-def test_narrowing__follows_convergence() -> None:
-    narrowing = Narrowing.of(SETTINGS, converged_at=30_000)
-    assert (narrowing.start, narrowing.end) == (30_000, 50_000)
-    assert narrowing.largest_deviation(40_000) == pytest.approx(0.2)
-
-
-def test_narrowing__of_no_share_is_none() -> None:
-    narrowing = Narrowing.of(SETTINGS.model_copy(update={"narrowing_share": 0.0}), converged_at=None)
-    assert narrowing.start == narrowing.end == 100_000
-    assert narrowing.largest_deviation(100_000) == 0.4
+@pytest.mark.parametrize(
+    ("share", "converged_at", "start", "end", "bounds"),
+    [
+        # halfway: by a factor of two, then again
+        (0.2, None, 80_000, 100_000, {0: 0.4, 80_000: 0.4, 90_000: 0.2, 100_000: 0.1, 120_000: 0.1}),
+        (0.2, 30_000, 30_000, 50_000, {40_000: 0.2}),
+        (0.0, None, 100_000, 100_000, {100_000: 0.4}),
+    ],
+)
+def test_narrowing__ends_with_the_budget_or_follows_convergence(
+    share: float, converged_at: int | None, start: int, end: int, bounds: dict[int, float]
+) -> None:
+    narrowing = Narrowing.of(SETTINGS.model_copy(update={"narrowing_share": share}), converged_at=converged_at)
+    assert (narrowing.start, narrowing.end) == (start, end)
+    assert {steps: narrowing.largest_deviation(steps) for steps in bounds} == pytest.approx(bounds)

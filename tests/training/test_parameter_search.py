@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -109,24 +107,10 @@ def test_games__do_not_depend_on_the_number_at_once(scene: OpenScene) -> None:
 
 @pytest.mark.parametrize(("share", "opponents"), [(0.0, range(20, 21)), (1.0, range(1)), (0.5, range(4, 17))])
 def test_games__are_without_the_opponent_in_their_share(share: float, opponents: range, scene: OpenScene) -> None:
-    other = _Counting()
+    other = Recording(scene)
     mixture = mixture_of(other, read_document(CAREFUL, Persona))
     play(scene, Recording(scene), mixture, games=20, at_once=20, alone_share=share)
-    assert len(other.games) in opponents
-
-
-class _Counting:
-    takes_over = True
-
-    def __init__(self) -> None:
-        self.games: set[int] = set()
-
-    def reset(self, games: IntArray) -> None:
-        """Do nothing."""
-
-    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
-        self.games |= {*games.tolist()}
-        return np.zeros((len(games), 2))
+    assert len(other.first) / 2 in opponents  # everything is played twice
 
 
 # --- proposals ---
@@ -183,7 +167,7 @@ def test_search__finds_the_speed_with_the_best_payoff(scene: OpenScene, tmp_path
 
 @pytest.mark.parametrize("stops_at", [[1], [3, 3, 4]])
 def test_search__an_interruption_does_not_change_the_trials(
-    stops_at: list[int], scene: OpenScene, tmp_path: Path
+    stops_at: list[int], scene: OpenScene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     search = search_of(scene, tmp_path, SLOW + SPEED)
     whole = run_search(search, tmp_path / "whole.json")
@@ -200,14 +184,7 @@ def test_search__an_interruption_does_not_change_the_trials(
     assert run_search(search, tmp_path / "stored.json", lambda *counts: reports.append(counts)) == whole
     assert reports == [(done, 5) for done in range(stops_at[-1], 6)]
     assert (tmp_path / "stored.json").read_bytes() == (tmp_path / "whole.json").read_bytes()
-
-
-def test_search__a_finished_search_plays_no_games(
-    scene: OpenScene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    search = search_of(scene, tmp_path, SLOW + SPEED, trials=2)
-    whole = run_search(search, tmp_path / "stored.json")
-    monkeypatch.setattr(harness.training.parameter_search, "PairedRollouts", None)
+    monkeypatch.setattr(harness.training.parameter_search, "PairedRollouts", None)  # a finished search plays no games
     assert run_search(search, tmp_path / "stored.json") == whole
 
 
@@ -231,14 +208,7 @@ class _Failing:
 
     def __init__(self, search: SearchSpec, fails: Any) -> None:
         self._driver, self._fails = search.driver, fails
-
-    @property
-    def searched(self) -> Any:
-        return self._driver.searched
-
-    @property
-    def numbers(self) -> Any:
-        return self._driver.numbers
+        self.searched, self.numbers = self._driver.searched, self._driver.numbers
 
     def tuned(self, values: Any) -> Any:
         if self._fails(values):
@@ -246,8 +216,7 @@ class _Failing:
         return self._driver.tuned(values)
 
     def make(self, *of: Any) -> Driver:
-        if self._fails(self.numbers):
-            raise ValueError("no such driver")
+        self.tuned(self.numbers)
         return self._driver.make(*of)
 
 
@@ -268,44 +237,3 @@ def test_search__fails_if_the_ego_can_not_play_with_its_own_parameters(scene: Op
     with pytest.raises(StageFailed, match="could not play with its own parameters: ValueError: no such driver"):
         run_search(replace(search, driver=fails), tmp_path / "stored.json")
     assert read_trials(tmp_path / "stored.json") == []
-
-
-# --- every kind of driver ---
-
-PROGRAM = """
-import json, sys
-for line in sys.stdin:
-    message = json.loads(line)
-    if message["type"] == "hello":
-        speed, entries = message["parameters"]["speed_mps"], message["layout"]
-        answer = {"protocol": 2}
-    elif message["type"] == "reset":
-        answer = {}
-    else:
-        now = [dict(zip(entries, seen)) for seen in message["observation"]]
-        steering = [0.5 * each["path_turned_rad@5m"] + 0.1 * each["path_left_m"] for each in now]
-        pedals = [max(-3.0, min(2.0, speed - each["speed_mps"])) for each in now]
-        answer = {"actions": list(zip(pedals, steering))}
-    print(json.dumps(answer), flush=True)
-"""
-
-
-def test_search__of_a_program_uses_the_proposed_values(scene: OpenScene, tmp_path: Path) -> None:
-    (tmp_path / "drive.py").write_text(PROGRAM)
-    text = f'kind = "process"\ncommand = ["{sys.executable}", "drive.py"]\n'
-    text += "[parameters]\nspeed_mps = 5.0\n[tunable]\nspeed_mps = [3.0, 13.0]\n"
-    search = search_of(scene, tmp_path, text, trials=6, games=3, games_at_once=3, alone_share=1.0)
-    trials = run_search(search, tmp_path / "stored.json")
-    assert [each.error for each in trials] == [""] * 6
-    speeds = [each.values["speed_mps"] for each in trials]
-    payoffs = [each.mean_payoff or 0.0 for each in trials]
-    assert speeds[0] == 5.0
-    assert np.corrcoef(speeds, payoffs)[0, 1] > 0.8
-    assert not [pid for pid in os.listdir("/proc") if pid.isdigit() and b"drive.py" in _command(pid)]
-
-
-def _command(pid: str) -> bytes:
-    try:
-        return Path(f"/proc/{pid}/cmdline").read_bytes()
-    except OSError:
-        return b""

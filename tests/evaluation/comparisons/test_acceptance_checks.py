@@ -87,35 +87,6 @@ def test_failure_rate__covers_opponents_of_later_rounds() -> None:
     assert [check.arm for check in worst_of_each(checks)] == [later.name]
 
 
-def test_near_miss_rate__is_a_bound_of_its_own() -> None:
-    run = evidence({RETRAINED_VS: hundred(0)})
-    run = replace(run, summary=summarise(run.episodes.assign(near_miss=hundred(95))))
-    (check,) = judge({"near_miss_rate": 0.5}, "last", ["speedy"], [1], run)
-    assert (check.value, check.games, check.passed) == (0.95, 100, False)
-
-
-def test_failure_rate_alone__is_what_the_ego_has_forgotten() -> None:
-    run = evidence({NAIVE_ALONE: hundred(0), RETRAINED_VS: hundred(0), ALONE: hundred(20)})
-    (check,) = judge({"failure_rate_alone": 0.05}, "last", ["speedy"], [1], run)
-    assert (check.arm, check.value, check.passed) == ("retrained_alone_speedy", 0.2, False)
-
-
-def test_speed_loss__is_that_of_games_with_the_same_start() -> None:
-    run = evidence({NAIVE_VS: hundred(0), RETRAINED_VS: hundred(0)}, {NAIVE_VS: 13.5, RETRAINED_VS: 12.0})
-    strict, lenient = (judge({"speed_loss_mps": bound}, "last", ["speedy"], [1], run)[0] for bound in (1.0, 2.0))
-    assert (strict.value, strict.limit, strict.games) == (1.5, 1.5, 100)
-    assert (strict.passed, lenient.passed) == (False, True)
-
-
-def test_gap_share__is_judged_by_the_upper_end_of_the_gap() -> None:
-    row = {"role": "ego", "ego": "retrained_speedy", "non_ego": "speedy", "persona": "speedy", "seed": 1}
-    row |= {"payoff": -20.0, "gap": 2.0, "ci_high": 3.0, "pairs": 50}
-    run = evidence({RETRAINED_VS: hundred(0)})
-    run = replace(run, gaps=pd.DataFrame([row]))
-    (check,) = judge({"gap_share": 0.12}, "last", ["speedy"], [1], run)
-    assert (check.value, check.limit, check.games, check.passed) == (0.1, 0.15, 50, False)
-
-
 @pytest.mark.parametrize("bound", TITLES)
 def test_bound__that_was_not_measured_is_not_kept(bound: str) -> None:
     run = evidence({NAIVE_ALONE: hundred(0)})
@@ -135,21 +106,37 @@ def test_judged_ego__is_that_of_the_last_round_that_was_played() -> None:
     assert judged_ego("robust", "speedy", 1, played) == RobustEgo()
 
 
-def test_preventable_failure_rate__is_that_of_any_reference_driver_from_the_start() -> None:
-    run = evidence({RETRAINED_VS: hundred(7)})
-    row = {"arm": RETRAINED_VS.name, "seed": 1, "driver": "any", "from_start_rate": 0.02, "from_start_rate_high": 0.07}
-    judged = pd.DataFrame([row, row | {"driver": "rss", "from_start_rate": 0.01}])
-    run = replace(run, preventability=judged)
-    strict, lenient = (
-        judge({"preventable_failure_rate": bound}, "last", ["speedy"], [1], run)[0] for bound in (0.05, 0.08)
-    )
-    assert (strict.value, strict.limit, strict.games) == (0.02, 0.07, 100)
-    assert (strict.passed, lenient.passed) == (False, True)
+RUN = evidence({RETRAINED_VS: hundred(0)})
+NEAR_MISSES = replace(RUN, summary=summarise(RUN.episodes.assign(near_miss=hundred(95))))
+FORGOTTEN = evidence({NAIVE_ALONE: hundred(0), RETRAINED_VS: hundred(0), ALONE: hundred(20)})
+SLOW = evidence({NAIVE_VS: hundred(0), RETRAINED_VS: hundred(0)}, {NAIVE_VS: 13.5, RETRAINED_VS: 12.0})
+PAIR = {"role": "ego", "ego": "retrained_speedy", "non_ego": "speedy", "persona": "speedy", "seed": 1}
+GAPS = replace(RUN, gaps=pd.DataFrame([PAIR | {"payoff": -20.0, "gap": 2.0, "ci_high": 3.0, "pairs": 50}]))
+ANY = {"arm": RETRAINED_VS.name, "seed": 1, "driver": "any", "from_start_rate": 0.02, "from_start_rate_high": 0.07}
+JUDGED = replace(
+    evidence({RETRAINED_VS: hundred(7)}),
+    preventability=pd.DataFrame([ANY, ANY | {"driver": "rss", "from_start_rate": 0.01}]),
+)
+UNFAILING = replace(RUN, preventability=pd.DataFrame(columns=["arm", "seed", "driver"]))
 
 
-def test_preventable_failure_rate__without_failures_is_that_of_failures() -> None:
-    run = evidence({RETRAINED_VS: hundred(0)})
-    none = pd.DataFrame(columns=["arm", "seed", "driver"])
-    run = replace(run, preventability=none)
-    (check,) = judge({"preventable_failure_rate": 0.05}, "last", ["speedy"], [1], run)
-    assert (check.value, check.limit) == (0.0, pytest.approx(0.0362, abs=1e-4))
+@pytest.mark.parametrize(
+    ("run", "name", "bounds", "value", "limit", "games"),
+    [
+        # a bound that is not kept and one that is; the limit is the end of the interval that is judged
+        (NEAR_MISSES, "near_miss_rate", (0.5, 0.99), 0.95, 0.9836, 100),
+        (FORGOTTEN, "failure_rate_alone", (0.25, 0.3), 0.2, 0.2918, 100),
+        (SLOW, "speed_loss_mps", (1.0, 2.0), 1.5, 1.5, 100),
+        (GAPS, "gap_share", (0.12, 0.15), 0.1, 0.15, 50),
+        (JUDGED, "preventable_failure_rate", (0.05, 0.08), 0.02, 0.07, 100),
+        (UNFAILING, "preventable_failure_rate", (0.03, 0.05), 0.0, 0.0362, 100),  # that of failures
+    ],
+)
+def test_bound__is_kept_by_the_end_of_the_interval(
+    run: Evidence, name: str, bounds: tuple[float, float], value: float, limit: float, games: int
+) -> None:
+    checks = [judge({name: bound}, "last", ["speedy"], [1], run)[0] for bound in bounds]
+    assert [check.passed for check in checks] == [False, True]
+    assert {(check.value, check.games) for check in checks} == {(value, games)}
+    assert checks[0].limit == pytest.approx(limit, abs=1e-4)
+    assert (checks[0].arm == ALONE.name) == (name == "failure_rate_alone")

@@ -126,14 +126,11 @@ def stopping(ego_gain, non_ego_gain, games=30):
     return gaps([EGO, NON_EGO], table(pair, best_ego, best_non_ego), 0.01)
 
 
-def test_nothing_to_gain__if_neither_gap_is_distinguishable_from_0():
-    assert nothing_to_gain(stopping(0, 0))
-    assert nothing_to_gain(stopping(-2, 0))
-
-
-def test_nothing_to_gain__not_if_one_gap_is():
-    assert not nothing_to_gain(stopping(2, 0))
-    assert not nothing_to_gain(stopping(0, 2))
+@pytest.mark.parametrize(
+    ("ego_gain", "non_ego_gain", "nothing"), [(0, 0, True), (-2, 0, True), (2, 0, False), (0, 2, False)]
+)
+def test_nothing_to_gain__if_neither_gap_is_distinguishable_from_0(ego_gain, non_ego_gain, nothing):
+    assert nothing_to_gain(stopping(ego_gain, non_ego_gain)) == nothing
 
 
 def test_nothing_to_gain__not_without_a_response_or_a_measurement_of_each_side():

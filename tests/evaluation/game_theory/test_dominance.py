@@ -15,26 +15,20 @@ tables = st.tuples(st.integers(1, 5), st.integers(1, 4)).flatmap(
 )
 
 
-def test_dominated__by_a_pure_strategy_is_named():
-    assert dominated(np.array([[1.0, 2], [2, 3], [0, 9]]), NAMES) == ["retrained", "", ""]
-
-
-def test_dominated__by_a_mixture_only():
-    # half and half of the first two earns 2 everywhere, more than the third's 1.5; no pure one is better everywhere
-    assert dominated(np.array([[4.0, 0], [0, 4], [1.5, 1.5]]), NAMES) == ["", "", "0.50 naive + 0.50 retrained"]
-
-
-def test_dominated__a_mixture_that_is_only_as_good_does_not_dominate():
-    assert dominated(np.array([[4.0, 0], [0, 4], [2, 2]]), NAMES) == ["", "", ""]
-
-
-def test_dominated__equal_somewhere_is_not_strictly_better():
-    assert dominated(np.array([[1.0, 2], [1, 3], [0, 2]]), NAMES) == ["", "", "retrained"]
-
-
-@pytest.mark.parametrize("table", [np.full((3, 2), 5.0), np.array([[1.0, 2.0]])])
-def test_dominated__no_strategy_of_a_constant_game(table):
-    assert dominated(table, NAMES[: len(table)]) == [""] * len(table)
+@pytest.mark.parametrize(
+    ("table", "by"),
+    [
+        ([[1, 2], [2, 3], [0, 9]], ["retrained", "", ""]),
+        # half and half of the first two earns 2 everywhere, more than 1.5; no pure one is better everywhere
+        ([[4, 0], [0, 4], [1.5, 1.5]], ["", "", "0.50 naive + 0.50 retrained"]),
+        ([[4, 0], [0, 4], [2, 2]], ["", "", ""]),  # a mixture that is only as good
+        ([[1, 2], [1, 3], [0, 2]], ["", "", "retrained"]),  # equal somewhere is not strictly better
+        ([[5, 5], [5, 5], [5, 5]], ["", "", ""]),
+        ([[1, 2]], [""]),
+    ],
+)
+def test_dominated__by_what_is_better_everywhere(table, by):
+    assert dominated(np.array(table, dtype=float), NAMES[: len(table)]) == by
 
 
 @settings(deadline=None, max_examples=60)
@@ -56,12 +50,13 @@ def test_safest_mixture__equalises_the_worst_cases():
     assert (shares @ [[0.4, 0.0], [0.0, 0.2]]).max() == pytest.approx(2 / 15, abs=1e-6)
 
 
-def test_safest_mixture__one_that_is_best_everywhere_is_not_mixed():
-    assert safest_mixture(np.array([[0.3, 0.2], [0.1, 0.0], [0.2, 0.1]])).tolist() == [0, 1, 0]
-
-
-def test_safest_mixture__of_equal_worst_cases_the_lower_mean_is_taken():
-    assert safest_mixture(np.array([[0.3, 0.3], [0.3, 0.1], [0.3, 0.2]])).tolist() == [0, 1, 0]
+@pytest.mark.parametrize(
+    "table",
+    [[[0.3, 0.2], [0.1, 0.0], [0.2, 0.1]], [[0.3, 0.3], [0.3, 0.1], [0.3, 0.2]]],
+    ids=["the best everywhere", "the lower mean of equal worst cases"],
+)
+def test_safest_mixture__of_one_ego(table):
+    assert safest_mixture(np.array(table)).tolist() == [0, 1, 0]
 
 
 @settings(deadline=None, max_examples=100)
