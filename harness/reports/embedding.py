@@ -43,7 +43,7 @@ COLUMNS = {
     "leader_gap_m": PackedColumn(0.1, 1),
     "time_to_collision_s": PackedColumn(0.1, 1),
 }
-"""The columns of a player; background vehicles have the first `BACKGROUND_COLUMNS` of them."""
+"""The columns of a player, in their order; background vehicles have the first `BACKGROUND_COLUMNS` of them."""
 BACKGROUND_COLUMNS = 4
 NOTHING = -1
 """Stands for a missing gap or time."""
@@ -84,7 +84,7 @@ def game_text(game: GameTracks, marks: Marks, crowds: Crowds) -> str:
     """One game as JSON, with its manoeuvres and the personas of its crowd, if it has one."""
     crowd = crowds.get(game.persona, ())
     people = dict(zip(roles_of(1 + len(crowd))[NON_EGO:], crowd, strict=True)) if crowd else {}
-    times = [player.time_to_collision_s for player in game.players if player.name == "ego"]
+    times = [player.columns["time_to_collision_s"] for player in game.players if player.name == "ego"]
     measured = [float(values[np.isfinite(values)].min()) for values in times if np.isfinite(values).any()]
     players = []
     for player in game.players:
@@ -110,19 +110,16 @@ def game_text(game: GameTracks, marks: Marks, crowds: Crowds) -> str:
 
 
 def _track(track: Track) -> dict[str, Any]:
-    size = [round(track.length_m, 3), round(track.width_m, 3)]
-    return {"name": track.name, "size": size, "first": track.first_step, "count": len(track.x_m)}
+    size = [round(side_m, 3) for side_m in track.size_m]
+    return {"name": track.name, "size": size, "first": track.first_step, "count": len(track.columns["x_m"])}
 
 
 def columns_of(game: GameTracks) -> Iterator[tuple[IntArray, int]]:
     """A game's columns as whole numbers, track by track, each with the number of its differences."""
-    names = list(COLUMNS)
-    tracks: list[tuple[Track, Sequence[str]]] = [(player, names) for player in game.players]
-    tracks += [(vehicle, names[:BACKGROUND_COLUMNS]) for vehicle in game.background]
-    for track, columns in tracks:
-        for name in columns:
+    for track in (*game.players, *game.background):
+        for name, values in track.columns.items():
             unit, differences = COLUMNS[name]
-            yield _whole(getattr(track, name), unit), differences
+            yield _whole(values, unit), differences
 
 
 def _whole(values: Any, unit: float) -> IntArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 from urllib.parse import quote
@@ -15,32 +15,18 @@ FloatArray = NDArray[np.floating[Any]]
 
 @dataclass(frozen=True, kw_only=True)
 class Track:
-    """The track of one road user: arrays [n], a value per step from `first_step` on, of the body's centre."""
+    """The track of one road user, of its body's centre; `outcome` and `ended_step` are those of a player."""
 
     name: str
     """`ego`, `non_ego`, `non_ego_2` and so on, or SUMO's id of a background vehicle."""
-    length_m: float
-    width_m: float
+    size_m: tuple[float, float]
+    """Length and width."""
     first_step: int
-    x_m: FloatArray
-    y_m: FloatArray
-    heading_rad: FloatArray
-    speed_mps: FloatArray
-
-
-@dataclass(frozen=True, kw_only=True)
-class PlayerTrack(Track):
-    """The track of a player and its measurements; gap and time are inf or NaN without leader or collision course."""
-
-    acceleration_mps2: FloatArray
-    steering_rad: FloatArray
-    lapsed: NDArray[np.bool_]
-    leader_gap_m: FloatArray
-    time_to_collision_s: FloatArray
-    outcome: str
+    columns: Mapping[str, FloatArray]
+    """[n] values from `first_step` on, by names of `embedding.COLUMNS` and in their order: all of a player."""
+    outcome: str = ""
     """goal, collision, rail, timeout; empty if it was still driving at the end of the game."""
-    ended_step: int | None
-    """The step of the outcome."""
+    ended_step: int | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +41,7 @@ class GameTracks:
     steps: int
     outcome: str
     """Of the judged player: the ego, or the non-ego where it drives alone."""
-    players: Sequence[PlayerTrack]
+    players: Sequence[Track]
     background: Sequence[Track]
     touches: Sequence[tuple[float, float, float]]
     """Time (s) and place (x, y in m) of each contact."""

@@ -31,7 +31,7 @@ def test_columns__are_the_trace_to_half_a_unit(games):
     columns = [column for column, _ in columns_of(game)]
     ego = game.players[0]
     for column, (name, (unit, _)) in zip(columns, COLUMNS.items(), strict=False):
-        values = np.asarray(getattr(ego, name), dtype=float)
+        values = np.asarray(ego.columns[name], dtype=float)
         measured = np.isfinite(values)
         assert np.abs(column[measured] * unit - values[measured]).max() <= 0.5 * unit + 1e-9
         assert (column[~measured] == NOTHING).all()

@@ -146,9 +146,9 @@ def test_road__cars_are_where_the_trace_has_them(player, games, settings):
     for step in (3, 27, 48, 60):
         scrub(page, step * STEP_S)
         for player in games[GAME].players:
-            found = pixel(page, 0, player.x_m[step], player.y_m[step])
+            found = pixel(page, 0, player.columns["x_m"][step], player.columns["y_m"][step])
             assert found == colour(page, names[player.name]), (step, player.name)
-        assert pixel(page, 0, games[GAME].players[0].x_m[step] + 5, -1.6) == colour(page, "--asphalt")
+        assert pixel(page, 0, games[GAME].players[0].columns["x_m"][step] + 5, -1.6) == colour(page, "--asphalt")
 
 
 def test_road__between_two_steps_a_car_is_between_its_places(player, games):
@@ -157,9 +157,9 @@ def test_road__between_two_steps_a_car_is_between_its_places(player, games):
     scrub(page, 2.0)
     page.locator("[data-is=time]").evaluate("slider => { slider.step = 'any'; }")
     scrub(page, 2.05)
-    ahead = (ego.x_m[20] + ego.x_m[21]) / 2 + 2.2
-    assert pixel(page, 0, ahead + 0.25, ego.y_m[20]) == colour(page, "--asphalt")
-    assert pixel(page, 0, ahead, ego.y_m[20]) != colour(page, "--asphalt")
+    ahead = (ego.columns["x_m"][20] + ego.columns["x_m"][21]) / 2 + 2.2
+    assert pixel(page, 0, ahead + 0.25, ego.columns["y_m"][20]) == colour(page, "--asphalt")
+    assert pixel(page, 0, ahead, ego.columns["y_m"][20]) != colour(page, "--asphalt")
 
 
 def test_road__follows_the_players_or_shows_the_whole_road_and_zooms(player):
@@ -193,14 +193,15 @@ def test_side_by_side__games_have_the_same_time(player, games):
         scrub(page, step * STEP_S)
         for screen, name in enumerate((GAME, OTHER)):
             ego = games[name].players[0]
-            assert pixel(page, screen, ego.x_m[step], ego.y_m[step]) == colour(page, "--ego")
+            assert pixel(page, screen, ego.columns["x_m"][step], ego.columns["y_m"][step]) == colour(page, "--ego")
     press(page, "Space")
     until(page, "() => Number(document.querySelector('.player').dataset.time) > 4.5")
     press(page, "Space", "Period", "Comma")
     step = round(time_of(page) / STEP_S)
     for screen, name in enumerate((GAME, OTHER)):
         text = page.locator(".values").nth(screen).locator(".of-ego").inner_text()
-        assert text.startswith(f"ego {games[name].players[0].speed_mps[step]:.1f} m/s")
+        speed_mps = games[name].players[0].columns["speed_mps"][step]
+        assert text.startswith(f"ego {speed_mps:.1f} m/s")
     press(page, "b")
     page.wait_for_selector(".screens:not(.two)")
 
@@ -211,7 +212,7 @@ def test_one_road__shows_the_other_game_as_ghosts(player, games):
     page.locator("[data-do=road]").click()
     assert page.locator(".screen:visible").count() == 1
     ghost = games[OTHER].players[1]
-    place = ghost.x_m[40] + 1.2, ghost.y_m[40] - 0.5
+    place = ghost.columns["x_m"][40] + 1.2, ghost.columns["y_m"][40] - 0.5
     assert pixel(page, 0, *place) not in (colour(page, "--asphalt"), colour(page, "--non-ego"))
     again = player(page.evaluate("location.hash"))
     assert again.locator(".screen:visible").count() == 1

@@ -12,7 +12,8 @@ from harness.evaluation.tables import table_of
 from harness.evaluation.worst_first import worst_first
 from harness.game.arrays import FloatArray
 from harness.replay.selection import choose_games
-from harness.reports.player_data import GameTracks, PlayerTrack, Track
+from harness.reports.embedding import COLUMNS
+from harness.reports.player_data import GameTracks, Track
 
 STEP_S, STEPS = 0.1, 80
 OUTLINE = [[0, 0], [220, 0], [220, -3.2], [130, -3.2], [100, -6.4], [0, -6.4], [0, 0]]
@@ -47,23 +48,26 @@ def recorded_game(row: Any, background: int = 2) -> GameTracks:
     if row.non_ego_outcome:
         players.append(_player("non_ego", time, 32.0, -4.8, 13.4, random, row.non_ego_outcome))
     if outcome == "collision" and len(players) == 2:
-        shift = players[0].y_m[-1] - players[1].y_m[-1] - 1.75
-        players[1].y_m[:] += shift * np.clip((time - time[-1] + 2.5) / 2.5, 0, 1) ** 2
-        players[1].x_m[:] += (players[0].x_m[-1] - players[1].x_m[-1] + 1.2) * (time / time[-1])
+        ego, non_ego = (player.columns for player in players)
+        shift = ego["y_m"][-1] - non_ego["y_m"][-1] - 1.75
+        non_ego["y_m"][:] += shift * np.clip((time - time[-1] + 2.5) / 2.5, 0, 1) ** 2
+        non_ego["x_m"][:] += (ego["x_m"][-1] - non_ego["x_m"][-1] + 1.2) * (time / time[-1])
     touches = []
     if outcome in ("collision", "rail"):
-        y_m = players[0].y_m[-1] - 0.9 if outcome == "collision" else 0.0
-        touches.append((float(time[-1]), float(players[0].x_m[-1]), float(y_m)))
+        first = players[0].columns
+        y_m = first["y_m"][-1] - 0.9 if outcome == "collision" else 0.0
+        touches.append((float(time[-1]), float(first["x_m"][-1]), float(y_m)))
     along = [
         Track(
             name=f"car {n}",
-            length_m=5.0,
-            width_m=1.8,
+            size_m=(5.0, 1.8),
             first_step=0,
-            x_m=80 + 30 * n + 9.0 * time,
-            y_m=np.full(len(time), -1.6),
-            heading_rad=0 * time,
-            speed_mps=0 * time + 9.0,
+            columns={
+                "x_m": 80 + 30 * n + 9.0 * time,
+                "y_m": np.full(len(time), -1.6),
+                "heading_rad": 0 * time,
+                "speed_mps": 0 * time + 9.0,
+            },
         )
         for n in range(background)
     ]
@@ -89,7 +93,7 @@ def _player(
     speed_mps: float,
     random: np.random.Generator,
     outcome: str,
-) -> PlayerTrack:
+) -> Track:
     ego = name == "ego"
     wave = random.uniform(0.6, 1.4)
     acceleration = (-0.6 if ego else 0.5) * np.sin(wave * time) + random.normal(0, 0.08, len(time))
@@ -105,20 +109,14 @@ def _player(
     heading = np.arctan2(np.gradient(y), np.gradient(x))
     gap = np.where(np.abs(time - 3.5) < 2.5, 18 - 2.2 * time, np.inf)
     time_to_collision = np.where(time > 2.5, np.maximum(time[-1] - time, 0.0) * 1.3, np.inf)
-    return PlayerTrack(
+    steering = np.gradient(heading) * 2.0
+    lapsed = ((time > 2.0) & (time < 3.4) & (not ego)).astype(float)
+    values = (x, y, heading, speed, acceleration, steering, lapsed, gap, time_to_collision)
+    return Track(
         name=name,
-        length_m=4.6,
-        width_m=1.8,
+        size_m=(4.6, 1.8),
         first_step=0,
-        x_m=x,
-        y_m=y,
-        heading_rad=heading,
-        speed_mps=speed,
-        acceleration_mps2=acceleration,
-        steering_rad=np.gradient(heading) * 2.0,
-        lapsed=(time > 2.0) & (time < 3.4) & (not ego),
-        leader_gap_m=gap,
-        time_to_collision_s=time_to_collision,
+        columns=dict(zip(COLUMNS, values, strict=True)),
         outcome=outcome,
         ended_step=len(time) - 1,
     )

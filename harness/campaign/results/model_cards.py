@@ -6,6 +6,7 @@ gives the same card.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -17,17 +18,16 @@ from harness.campaign.plan.stages import AssessmentStage, Trained
 from harness.campaign.storage.manifest import is_tuned
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign
-from harness.config.human_limits import Perception
-from harness.config.persona import Parametrised, Persona
+from harness.config.persona import Persona
 from harness.config.training import ATTENTIVE_SHARE
 from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.strategies import NaiveEgo, strategy_name
 from harness.files import write_atomically
-from harness.game.human_factors import PERSISTENCE_S
 from harness.game.payoff_terms import GROUPS, TERMS
 from harness.game.roles import NON_EGO, ROLES
 from harness.reports.learning import stopped
 from harness.reports.numbers import MISSING, interval, number, percent
+from harness.reports.persona.profile import PersonaProfile, persona_profile
 
 CARD = "README.md"
 _PROGRAMS = ("python", "eclipse-sumo", "torch", "stable-baselines3", "numpy")
@@ -48,6 +48,7 @@ def model_card(stage: str, manifest: Mapping[str, Any], summary: pd.DataFrame, p
     is_ego = policy["player"] != ROLES[NON_EGO]
     document = manifest["ego_persona"] if is_ego else manifest["persona_documents"][entry["persona"]]
     persona = Persona.from_record(document)
+    profile = persona_profile(persona)
     versions = manifest["versions"]
     environment = Environment(
         loader=PackageLoader("harness", "campaign/results"),
@@ -66,7 +67,8 @@ def model_card(stage: str, manifest: Mapping[str, Any], summary: pd.DataFrame, p
         facts=list(_facts(entry, manifest, policy, persona)),
         persona=persona,
         alpha=" + ".join(f"{getattr(persona, group).weight:g} × {group}" for group in GROUPS),
-        terms=list(_terms(persona)),
+        terms=list(_terms(profile)),
+        attends=[*profile.attends, profile.decides],
         sources=persona.sources,
         seed=entry["seed"],
         intervals="Clopper-Pearson of rates" + (", t of speeds" if is_ego else ""),
@@ -119,27 +121,8 @@ def _facts(
     if entry.get("rule"):
         yield "convergence", entry["rule"]
     yield "training seed", str(entry["seed"])
-    yield "decisions", "the most likely action" if persona.decisions == "mode" else "sampled from the distribution"
-    if persona.attention is not None:
-        lapse = "–".join(f"{each:g}" for each in persona.attention.lapse_s)
-        yield "attention", f"lapses for {lapse} s after {persona.attention.mean_attentive_s:g} s on average"
-        if policy["player"] == ROLES[NON_EGO]:
-            yield "no lapses in", f"the first {percent(ATTENTIVE_SHARE)} of the budget"
-    if persona.perception is not None:
-        share, up_to_m = percent(persona.perception.no_blind_spot_check_share), persona.perception.unseen_behind_m
-        if persona.perception.no_blind_spot_check_share:
-            yield (
-                "no blind-spot check",
-                f"in {share} of drives: vehicles less than {up_to_m:g} m ahead (centres) are not seen",
-            )
-        yield from _sight(persona.perception)
-    if persona.reaction is not None:
-        yield "reaction", f"decisions take effect {'–'.join(f'{each:g}' for each in persona.reaction.delay_s)} s later"
-    if persona.actuators is not None:
-        uses = persona.actuators
-        shares = (uses.throttle_share, uses.braking_share, uses.steering_share)
-        throttle, braking, steering = map(percent, shares)
-        yield "use of the car", f"{throttle} of the acceleration, {braking} of the braking, {steering} of the steering"
+    if persona.attention is not None and policy["player"] == ROLES[NON_EGO]:
+        yield "no lapses in", f"the first {percent(ATTENTIVE_SHARE)} of the budget"
 
 
 def _beginning(settings: Mapping[str, Any]) -> str:
@@ -155,43 +138,26 @@ def _alone_share(entry: Mapping[str, Any], campaign: Campaign) -> float:
     return how.alone_share
 
 
-def _sight(perception: Perception) -> Iterator[tuple[str, str]]:
-    if perception.looked_but_failed_to_see_share:
-        share, within_m = percent(perception.looked_but_failed_to_see_share), perception.noticed_within_m
-        yield "looked but failed to see", f"in {share} of drives: vehicles more than {within_m:g} m away"
-    if perception.range_m is not None:
-        yield "range of sight", f"{perception.range_m:g} m"
-    if perception.distance_error or perception.closing_error_per_s:
-        distances = f"distances by {percent(perception.distance_error)}"
-        closing = f"closing speeds by {perception.closing_error_per_s:g} of the distance per second"
-        yield "errors of perception", f"{distances}, {closing}, for {PERSISTENCE_S:g} s"
-
-
 def _given(manifest: Mapping[str, Any], campaign: Campaign) -> str:
     recorded = manifest.get("ego_driver")
     return str(recorded["in_words"]) if recorded else f"the policy `{campaign.ego.driver}`"
 
 
-def _terms(persona: Persona) -> Iterator[Mapping[str, str]]:
+def _terms(profile: PersonaProfile) -> Iterator[Mapping[str, str]]:
     """The rows of the payoff's table."""
-    for group in GROUPS:
-        for name, given in getattr(persona, group).terms.items():
-            term, weight, meaning = TERMS[name], given, TERMS[name].meaning
-            if isinstance(given, Parametrised):
-                weight = given.weight
-                for key, value in given.limits.items():  # such as within_m
-                    word, _, unit = key.rpartition("_")
-                    meaning += f", {word} {value:g} {unit.replace('mps', 'm/s')}"
-            counts = "per second" if term.per_second else "per event"
-            yield {"group": group, "name": name, "weight": f"{weight:g}", "counts": counts, "meaning": meaning}
-    for each in persona.human.fuzzy:
+    for each in profile.terms:
+        counts = "per second" if TERMS[each.name].per_second else "per event"
+        meaning = ", ".join(filter(None, (each.meaning, each.limit)))
+        row = {"group": each.group, "name": each.name, "counts": counts, "meaning": meaning}
+        yield {**row, "weight": f"{each.weight:g}"}
+    for fuzzy in profile.persona.human.fuzzy:
         sets = "; ".join(
             f"{one.name} ({', '.join(f'{x:g}: {y:g}' for x, y in one.points)}) has the value {one.value:g}"
-            for one in each.sets
+            for one in fuzzy.sets
         )
-        meaning = f"fuzzy, of `{each.quantity}`: {sets}"
-        row = {"name": each.name, "weight": f"{each.weight:g}", "counts": "per second", "meaning": meaning}
-        yield {"group": "human", **row}
+        meaning = f"fuzzy, of `{fuzzy.quantity}`: {sets}"
+        row = {"group": "human", "name": fuzzy.name, "counts": "per second", "meaning": meaning}
+        yield {**row, "weight": f"{fuzzy.weight:g}"}
 
 
 _HEADINGS = {
@@ -210,20 +176,17 @@ def _figures(
             continue
         side = arm.ego if is_ego else arm.non_ego
         if [each.stage for each in side if isinstance(each, Trained)] == [stage]:
-            yield arm.name, _of_ego(rows[arm.name]) if is_ego else _of_non_ego(rows[arm.name])
+            yield arm.name, _cells(rows[arm.name], is_ego)
 
 
-def _of_ego(row: Mapping[Any, Any]) -> Sequence[str]:
-    rate = _with(percent(row["failure_rate"]), interval(row["failure_rate_low"], row["failure_rate_high"]))
-    low, high = (number(row[f"mean_speed_{end}_mps"], 2) for end in ("low", "high"))
-    speed = _with(number(row["mean_speed_mps"], 2), MISSING if low == MISSING else f"{low}–{high}")
-    return str(row["episodes"] - row["errors"]), rate, speed
-
-
-def _of_non_ego(row: Mapping[Any, Any]) -> Sequence[str]:
-    span = interval(row["non_ego_goal_rate_low"], row["non_ego_goal_rate_high"])
-    rate = _with(percent(row["non_ego_goal_rate"]), span)
-    return str(row["episodes"] - row["errors"]), rate, _with(number(row["non_ego_mean_speed_mps"], 2), MISSING)
+def _cells(row: Mapping[Any, Any], is_ego: bool) -> Sequence[str]:
+    rate, speed = ("failure_rate", "mean_speed") if is_ego else ("non_ego_goal_rate", "non_ego_mean_speed")
+    low, high = (number(row.get(f"{speed}_{end}_mps", math.nan), 2) for end in ("low", "high"))
+    return (
+        str(row["episodes"] - row["errors"]),
+        _with(percent(row[rate]), interval(row[f"{rate}_low"], row[f"{rate}_high"])),
+        _with(number(row[f"{speed}_mps"], 2), MISSING if low == MISSING else f"{low}–{high}"),
+    )
 
 
 def _with(value: str, span: str) -> str:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -19,8 +20,9 @@ from harness.game.arrays import FloatArray
 from harness.game.sight import TALL_WIDTH_M
 from harness.replay import choose_games
 from harness.replay.contacts import contacts
-from harness.replay.vehicles import types_of_vehicles
-from harness.reports.player_data import GameTracks, PlayerTrack, Track
+from harness.replay.vehicles import DrawnVehicle, types_of_vehicles
+from harness.reports.embedding import BACKGROUND_COLUMNS, COLUMNS
+from harness.reports.player_data import GameTracks, Track
 from harness.road.net.network import read_net
 from harness.road.scene import drawing
 from harness.road.scene.open_scene import OpenScene
@@ -54,23 +56,17 @@ def watching_order(episodes: pd.DataFrame, arms: Mapping[str, Arm]) -> pd.DataFr
     turn[judged_outcomes(chosen) == "goal"] = 0
     for game in chosen.loc[turn.sort_values(kind="stable").index].itertuples():
         order[game.Index] = None
-        for arm in _counterparts(arms.get(game.arm)):
-            counterpart = rows.get((arm, game.seed, game.episode))
+        for each in counterparts(arms[game.arm]) if game.arm in arms else ():
+            counterpart = rows.get((each.name, game.seed, game.episode))
             if counterpart is not None:
                 order[counterpart] = None
     order |= dict.fromkeys(worst_first(played).index)
     return played.loc[list(order)]
 
 
-def _counterparts(arm: Arm | None) -> list[str]:
-    """The names of the arms beside which an arm is shown."""
-    return [each.name for each in counterparts(arm)] if arm is not None else []
-
-
 def tracks_of(trace: pd.DataFrame, scene: OpenScene, game: Any) -> GameTracks:
     """One game's trace as tracks; `game` is its row of `episodes`."""
     types = types_of_vehicles(trace, scene.route_files, scene.obstacles)
-    sizes_m = {name: (kind.length_m, kind.width_m) for name, kind in types.items()}
     recorded = game_of(trace, scene)
     measures = {name: getattr(recorded.quantities, name) for name in ("leader_gap_m", "time_to_collision_s")}
     by_name = {str(name): rows.sort_values("step") for name, rows in trace.groupby("player", sort=True)}
@@ -79,18 +75,13 @@ def tracks_of(trace: pd.DataFrame, scene: OpenScene, game: Any) -> GameTracks:
         if role in by_name:
             rows = by_name.pop(role)
             steps = rows["step"].to_numpy()
+            seen = {name: np.where(recorded.drove, each, np.nan)[steps, place] for name, each in measures.items()}
+            track = _track(role, rows.assign(**seen), types[role], list(COLUMNS))
             ended = rows[rows["outcome"] != ""].head(1)
-            players.append(
-                PlayerTrack(
-                    **_track(role, rows, sizes_m),
-                    acceleration_mps2=rows["acceleration_mps2"].to_numpy(),
-                    steering_rad=rows["steering_rad"].to_numpy(),
-                    lapsed=rows["lapsed"].to_numpy(dtype=bool),
-                    **{name: np.where(recorded.drove, each, np.nan)[steps, place] for name, each in measures.items()},
-                    outcome="".join(ended["outcome"]),
-                    ended_step=int(ended["step"].iloc[0]) if len(ended) else None,
-                )
-            )
+            if len(ended):
+                track = replace(track, outcome=ended["outcome"].iloc[0], ended_step=int(ended["step"].iloc[0]))
+            players.append(track)
+    of_background = list(COLUMNS)[:BACKGROUND_COLUMNS]
     return GameTracks(
         arm=game.arm,
         persona=game.persona,
@@ -100,16 +91,20 @@ def tracks_of(trace: pd.DataFrame, scene: OpenScene, game: Any) -> GameTracks:
         steps=int(trace["step"].max()),
         outcome=judged(game._asdict())[1],
         players=players,
-        background=[Track(**_track(name, piece, sizes_m)) for name, rows in by_name.items() for piece in _pieces(rows)],
+        background=[
+            _track(name, piece, types[name], of_background) for name, rows in by_name.items() for piece in _pieces(rows)
+        ],
         touches=[(contact.time_s, contact.x_m, contact.y_m) for contact in contacts(trace, types, scene.rail_lines)],
     )
 
 
-def _track(name: str, rows: pd.DataFrame, sizes_m: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
-    motion = {column: rows[column].to_numpy() for column in ("x_m", "y_m", "heading_rad", "speed_mps")}
-    length_m, width_m = sizes_m[name]
-    first = int(rows["step"].iloc[0])
-    return {"name": name, "length_m": length_m, "width_m": width_m, "first_step": first, **motion}
+def _track(name: str, rows: pd.DataFrame, drawn: DrawnVehicle, columns: Sequence[str]) -> Track:
+    return Track(
+        name=name,
+        size_m=(drawn.length_m, drawn.width_m),
+        first_step=int(rows["step"].iloc[0]),
+        columns={column: rows[column].to_numpy(float) for column in columns},
+    )
 
 
 def _pieces(rows: pd.DataFrame) -> Iterator[pd.DataFrame]:

@@ -131,7 +131,7 @@ OF_NON_EGO = """
     | player | non_ego |
     | against | `naive-seed1` |
     | games without the other player | 70 % |
-    | attention | lapses for 4–6 s after 4 s on average |
+    lapses of 4 to 6 s, with 4 s of attention between them on average
     | no lapses in | the first 50 % of the budget |
     5 seconds
     | arm | games | reaches its goal | mean speed (m/s) |
@@ -146,15 +146,14 @@ OF_RETRAINED = """
 """
 OF_SPEEDY = """
     fuzzy, of `speed_over_limit`: within (0: 1, 0.15: 0) has the value 0; over
-    | decisions | sampled from the distribution |
-    | no blind-spot check | in 85 % of drives
+    - Actions are sampled from the policy's distribution
+    - No blind-spot check in 85 % of the drives
 """
 OF_FACTORS = """
-    | looked but failed to see | in 30 % of drives: vehicles more than 8 m away |
-    | range of sight | 60 m |
-    | errors of perception | distances by 10 %, closing speeds by 0 of the distance per second, for 20 s |
-    | reaction | decisions take effect 0.2–0.4 s later |
-    | use of the car | 50 % of the acceleration, 100 % of the braking, 100 % of the steering |
+    - In 30 % of the drives the person looks but fails to see: a vehicle is noticed within 8 m only.
+    - Vehicles more than 60 m away are never seen.
+    - A decision takes effect 0.2 to 0.4 s later
+    - The person uses 50 % of the acceleration of the car.
 """
 
 

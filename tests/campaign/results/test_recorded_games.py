@@ -80,17 +80,18 @@ def test_game__is_its_trace(merge, row):
     ego, non_ego = tracks.players
     assert (tracks.steps, tracks.step_s, tracks.outcome) == (4, 0.1, "rail")
     assert (ego.outcome, ego.ended_step) == ("rail", 3)
-    assert (non_ego.outcome, non_ego.ended_step, len(non_ego.x_m)) == ("goal", 2, 3)
-    assert ego.x_m.tolist() == [20, 21, 22, 23, 24]
-    assert ego.lapsed.tolist() == [False, False, True, False, False]
-    assert (ego.length_m, ego.width_m) == (4.6, 1.8)
+    assert (non_ego.outcome, non_ego.ended_step, len(non_ego.columns["x_m"])) == ("goal", 2, 3)
+    assert ego.columns["x_m"].tolist() == [20, 21, 22, 23, 24]
+    assert ego.columns["lapsed"].tolist() == [False, False, True, False, False]
+    assert ego.size_m == (4.6, 1.8)
     (touch,) = tracks.touches
     assert (touch[0], touch[2]) == (pytest.approx(0.3), pytest.approx(0.0, abs=0.01))
 
 
 def test_game__a_background_vehicle_that_is_absent_for_a_while_is_in_pieces(merge, row):
     tracks = tracks_of(trace(merge.world, ego=(range(6), -1.6, {}), van=([1, 2, 4, 5], -4.8, {})), merge, row)
-    assert [(each.name, each.first_step, len(each.x_m)) for each in tracks.background] == [("van", 1, 2), ("van", 4, 2)]
+    pieces = [(each.name, each.first_step, len(each.columns["x_m"])) for each in tracks.background]
+    assert pieces == [("van", 1, 2), ("van", 4, 2)]
 
 
 def test_drawing__of_the_merge(merge):
