@@ -71,42 +71,6 @@ class _Views(NamedTuple):
     width_m: FloatArray  # [P]
 
 
-class _Eye(NamedTuple):
-    """The player `p` of game `g`, which observes."""
-
-    g: int
-    p: int
-    place: OnRoute
-    x_m: float
-    y_m: float
-    heading_rad: float
-    cosine: float  # of the heading
-    sine: float
-    speed_mps: float
-    length_m: float
-    width_m: float
-    unseen_behind_m: float
-    sight_m: float
-    sight_cosine: float
-    distance_error: float
-    closing_error_per_s: float
-
-
-class _Body(NamedTuple):
-    """Another body, and the player's conflict with it."""
-
-    x_m: float
-    y_m: float
-    heading_rad: float
-    speed_mps: float
-    length_m: float
-    width_m: float
-    meets: bool
-    own_m: float  # to the conflict
-    other_m: float
-    must_yield: bool
-
-
 _columns = attrgetter(*_Players._fields)  # plain tuples: numba takes them apart three times as fast as records
 
 
@@ -135,33 +99,46 @@ def _observe(tables: tuple[tuple[Any, ...], ...]) -> FloatArray:
     for g, p in np.ndindex(players.present.shape):
         if players.present[g, p]:
             place = on_route(players.station_m[g, p], views.offset_m[g, p], p, routes)
-            eye = _eye(players, views, place, (g, p))
+            heading_rad, own_mps = players.heading_rad[g, p], players.speed_mps[g, p]
+            cosine, sine, sight_m = np.cos(heading_rad), np.sin(heading_rad), min(players.sight_m[g, p], SEEN_M)
+            error, sight_cosine = players.distance_error[g, p], players.sight_cosine[g, p]
             view[:] = 0.0
-            _see_own_motion(view, eye, players, views)
+            _see_own_motion(view, players, views, (g, p))
+            view[OWN.path_left_m] = -place.offset_m
             view[OWN.own_side_left_m] = routes.own_left_m[place.row] - place.offset_m
             view[OWN.own_side_right_m] = routes.own_right_m[place.row] - place.offset_m
             for k in range(_COUNT):
-                _see_road(view, k, eye, routes)
+                _see_road(view, k, (place, heading_rad), routes)
             if views.next_line[g, p] < 0:
                 view[OWN.stop_line_m] = np.inf
             else:
-                _see_stop_line(view, eye, views.next_line[g, p], stop_lines)
+                front_m = place.station_m + 0.5 * views.length_m[p]
+                _see_stop_line(view, front_m, views.next_line[g, p], stop_lines)
                 link = stop_lines.link[views.next_line[g, p]]
                 if link >= 0:
                     _see_signal(view, players.signals[g, link], players.signal_s[g, link])
             leader_m, leader_mps = np.inf, 0.0
             for b in range(count):
-                body = _body(bodies, meetings, (g, p, b))
-                in_view, urgency_s[b] = _look(eye, body)
+                x_m, y_m, speed_mps = bodies.x_m[g, b], bodies.y_m[g, b], bodies.speed_mps[g, b]
+                dx, dy = x_m - players.x_m[g, p], y_m - players.y_m[g, p]
+                ahead_m, distance_m = dx * cosine + dy * sine, np.hypot(dx, dy)
+                in_view = ahead_m >= players.unseen_behind_m[g, p] and ahead_m >= sight_cosine * distance_m
+                in_view = in_view and distance_m <= sight_m
+                urgency_s[b] = distance_m / _NEARNESS_MPS
+                if meetings.conflict[g, p, b] >= 0:
+                    own_s = max(meetings.own_m[g, p, b], 0.0) / max(own_mps, _LEAST_MPS)
+                    other_s = max(meetings.other_m[g, p, b], 0.0) / max(speed_mps, _LEAST_MPS)
+                    urgency_s[b] = min(urgency_s[b], max(own_s, other_s))
                 seen[b] = bodies.present[g, b] and b != p and in_view and not views.hidden[g, p, b]
                 if seen[b]:
-                    x_m = body.x_m + eye.distance_error * (body.x_m - eye.x_m)  # where the player takes it to be
-                    y_m = body.y_m + eye.distance_error * (body.y_m - eye.y_m)
-                    ahead_m, left_m, frame = point_along_route(place, routes, x_m, y_m)
-                    on_path = (ahead_m, left_m, routes.heading_rad[frame])
-                    gap_m, relative_mps = _see_on_path(view, eye, body, on_path)
+                    # where the player takes it to be
+                    ahead_m, left_m, frame = point_along_route(place, routes, x_m + error * dx, y_m + error * dy)
+                    turned = bodies.heading_rad[g, b] - routes.heading_rad[frame]
+                    sizes_m = (bodies.length_m[g, b], bodies.width_m[g, b], views.length_m[p], views.width_m[p])
+                    gap_m = _narrow_by(view, (ahead_m, left_m, turned), sizes_m)
                     if gap_m < leader_m:
-                        leader_m, leader_mps = gap_m, relative_mps
+                        leader_m, closing_mps = gap_m, players.closing_error_per_s[g, p] * ahead_m
+                        leader_mps = speed_mps * np.cos(turned) - own_mps + closing_mps
             if leader_m < np.inf:  # else zeros: a learner that is always alone must not learn from its absence
                 view[OWN.leader_seen], view[OWN.leader_mps] = 1.0, leader_mps
                 view[OWN.leader_gap_m] = max(leader_m, 0.0)
@@ -171,52 +148,15 @@ def _observe(tables: tuple[tuple[Any, ...], ...]) -> FloatArray:
                 if b < 0:
                     break
                 last, last_s = b, urgency_s[b]
-                _see_other(view[FIRST_OTHER + k * ENTRIES :], eye, _body(bodies, meetings, (g, p, b)))
+                entry = view[FIRST_OTHER + k * ENTRIES :]
+                _see_other(entry, (g, p, b), players, bodies)
+                if meetings.conflict[g, p, b] >= 0:
+                    ways_m = (meetings.own_m[g, p, b], meetings.other_m[g, p, b])
+                    _see_conflict(entry, 1.0 + error, ways_m, (own_mps, bodies.speed_mps[g, b]))
+                    entry[OTHER.has_priority] = 1.0 if meetings.must_yield[g, p, b] else -1.0
             for k in range(SIZE):
                 observation[g, p, k] = _scaled(view[k], SCALE[k], COMPRESSED[k])
     return observation
-
-
-@inlined
-def _eye(players: _Players, views: _Views, place: OnRoute, who: tuple[int, int]) -> _Eye:
-    g, p = who
-    heading_rad = players.heading_rad[g, p]
-    return _Eye(
-        g,
-        p,
-        place,
-        players.x_m[g, p],
-        players.y_m[g, p],
-        heading_rad,
-        np.cos(heading_rad),
-        np.sin(heading_rad),
-        players.speed_mps[g, p],
-        views.length_m[p],
-        views.width_m[p],
-        players.unseen_behind_m[g, p],
-        min(players.sight_m[g, p], SEEN_M),
-        players.sight_cosine[g, p],
-        players.distance_error[g, p],
-        players.closing_error_per_s[g, p],
-    )
-
-
-@inlined
-def _body(bodies: Bodies, met: Meetings, which: tuple[int, int, int]) -> _Body:
-    """A body, given by the indices of game, player and body."""
-    g, p, b = which
-    return _Body(
-        bodies.x_m[g, b],
-        bodies.y_m[g, b],
-        bodies.heading_rad[g, b],
-        bodies.speed_mps[g, b],
-        bodies.length_m[g, b],
-        bodies.width_m[g, b],
-        met.conflict[g, p, b] >= 0,
-        met.own_m[g, p, b],
-        met.other_m[g, p, b],
-        met.must_yield[g, p, b],
-    )
 
 
 @compiled
@@ -227,36 +167,36 @@ def _scaled(value: float, scale: float, compressed: bool) -> float:
 
 
 @inlined
-def _see_own_motion(view: FloatArray, eye: _Eye, players: _Players, views: _Views) -> None:
+def _see_own_motion(view: FloatArray, players: _Players, views: _Views, who: tuple[int, int]) -> None:
     """Write the entries of the own motion and of the road at the player."""
-    g, p = eye.g, eye.p
-    view[OWN.speed_mps] = eye.speed_mps
+    g, p = who
+    view[OWN.speed_mps] = players.speed_mps[g, p]
     view[OWN.speed_limit_mps] = views.speed_limit_mps[g, p]
-    view[OWN.speed_over_limit] = eye.speed_mps / views.speed_limit_mps[g, p] - 1.0
-    view[OWN.over_posted_mps] = eye.speed_mps - views.posted_mps[g, p]
+    view[OWN.speed_over_limit] = players.speed_mps[g, p] / views.speed_limit_mps[g, p] - 1.0
+    view[OWN.over_posted_mps] = players.speed_mps[g, p] - views.posted_mps[g, p]
     view[OWN.acceleration_mps2] = players.acceleration_mps2[g, p]
     view[OWN.steering_rad] = players.steering_rad[g, p] / views.max_steering_rad[p]
     view[OWN.road_steering_rad] = views.road_steering_rad[g, p] / views.max_steering_rad[p]
     view[OWN.lane_end_m], view[OWN.goal_m] = views.lane_end_m[g, p], views.goal_m[g, p]
-    view[OWN.path_left_m] = -eye.place.offset_m
 
 
 @inlined
-def _see_road(view: FloatArray, k: int, eye: _Eye, routes: Routes) -> None:
+def _see_road(view: FloatArray, k: int, pose: tuple[OnRoute, float], routes: Routes) -> None:
     """Write the entries of the path at the distance `AHEAD_M[k]`: its direction, bends and edges."""
-    ahead = row_ahead(eye.place, BEHIND + k)
-    turned = routes.heading_rad[ahead] - eye.heading_rad
+    place, heading_rad = pose
+    ahead = row_ahead(place, BEHIND + k)
+    turned = routes.heading_rad[ahead] - heading_rad
     view[OWN.path_turned_rad + k] = (turned + np.pi) % (2.0 * np.pi) - np.pi
-    view[OWN.path_bend_per_m + k] = routes.bend_ahead_per_m[eye.place.row, k]
-    view[OWN.free_left_m + k] = routes.left_edge_m[ahead] - eye.place.offset_m
-    view[OWN.free_right_m + k] = routes.right_edge_m[ahead] - eye.place.offset_m
+    view[OWN.path_bend_per_m + k] = routes.bend_ahead_per_m[place.row, k]
+    view[OWN.free_left_m + k] = routes.left_edge_m[ahead] - place.offset_m
+    view[OWN.free_right_m + k] = routes.right_edge_m[ahead] - place.offset_m
 
 
 @inlined
-def _see_stop_line(view: FloatArray, eye: _Eye, line: int, lines: StopLines) -> None:
+def _see_stop_line(view: FloatArray, front_m: float, line: int, lines: StopLines) -> None:
     """Write the entries of the next stop line, of a row of the table."""
     control = lines.control[line]
-    view[OWN.stop_line_m] = lines.station_m[line] - (eye.place.station_m + 0.5 * eye.length_m)
+    view[OWN.stop_line_m] = lines.station_m[line] - front_m
     view[OWN.give_way] = 1.0 if control == Control.GIVE_WAY else 0.0
     view[OWN.stop_sign] = 1.0 if control in (Control.STOP, Control.ALL_WAY_STOP) else 0.0
 
@@ -271,34 +211,20 @@ def _see_signal(view: FloatArray, signal: int, since_s: float) -> None:
 
 
 @compiled
-def _look(eye: _Eye, body: _Body) -> tuple[bool, float]:
-    """Whether a body is where the player looks, and how soon the player may meet it (s)."""
-    dx, dy = body.x_m - eye.x_m, body.y_m - eye.y_m
-    ahead_m, distance_m = dx * eye.cosine + dy * eye.sine, np.hypot(dx, dy)
-    in_view = ahead_m >= eye.unseen_behind_m and distance_m <= eye.sight_m
-    urgency_s = distance_m / _NEARNESS_MPS
-    if body.meets:
-        own_s = max(body.own_m, 0.0) / max(eye.speed_mps, _LEAST_MPS)
-        other_s = max(body.other_m, 0.0) / max(body.speed_mps, _LEAST_MPS)
-        urgency_s = min(urgency_s, max(own_s, other_s))
-    return in_view and ahead_m >= eye.sight_cosine * distance_m, urgency_s
-
-
-@compiled
-def _see_on_path(view: FloatArray, eye: _Eye, body: _Body, place: tuple[float, float, float]) -> tuple[float, float]:
-    """Reduce the free widths by a body at a place along the route and beside it, where the route has a heading. If it
-    is ahead in the player's way: the gap to it and its relative speed, else an infinite gap."""
-    along, beside, route_heading_rad = place
-    extent = 0.5 * (body.length_m + body.width_m)  # at least the half extents, which take longer to compute
+def _narrow_by(
+    view: FloatArray, place: tuple[float, float, float], sizes_m: tuple[float, float, float, float]
+) -> float:
+    """Reduce the free widths by a body at a place along the route and beside it, turned from the route. The gap to it
+    if it is ahead in the player's way, else inf. `sizes_m` are length and width of the body and of the player."""
+    (along, beside, turned), (length_m, width_m, own_length_m, own_width_m) = place, sizes_m
+    extent = 0.5 * (length_m + width_m)  # at least the half extents, which take longer to compute
     if along + extent <= _EDGES[0] or along - extent >= _EDGES[-1]:
-        return np.inf, 0.0
-    turned = body.heading_rad - route_heading_rad
-    half_length, half_width = half_extents_m(turned, body.length_m, body.width_m)
+        return np.inf
+    half_length, half_width = half_extents_m(turned, length_m, width_m)
     _narrow(view, (along - half_length, along + half_length), beside, half_width)
-    if along <= 0.0 or abs(beside) >= half_width + 0.5 * eye.width_m:
-        return np.inf, 0.0
-    closing = eye.closing_error_per_s * along
-    return along - half_length - 0.5 * eye.length_m, body.speed_mps * np.cos(turned) - eye.speed_mps + closing
+    if along <= 0.0 or abs(beside) >= half_width + 0.5 * own_width_m:
+        return np.inf
+    return along - half_length - 0.5 * own_length_m
 
 
 @compiled
@@ -313,23 +239,33 @@ def _narrow(view: FloatArray, ends_m: tuple[float, float], left_m: float, half_w
                 view[OWN.free_right_m + k] = max(view[OWN.free_right_m + k], left_m + half_width_m)
 
 
-@compiled
-def _see_other(entry: FloatArray, eye: _Eye, body: _Body) -> None:
-    """Write the entries of one other body."""
-    dx, dy, further = body.x_m - eye.x_m, body.y_m - eye.y_m, 1.0 + eye.distance_error
-    ahead_m, left_m = dx * eye.cosine + dy * eye.sine, dy * eye.cosine - dx * eye.sine
-    turned, closing = body.heading_rad - eye.heading_rad, eye.closing_error_per_s
+@inlined
+def _see_other(entry: FloatArray, which: tuple[int, int, int], players: _Players, bodies: Bodies) -> None:
+    """Write the entries of one other body but those of the conflict with it."""
+    g, p, b = which
+    own_mps, heading_rad, speed_mps = players.speed_mps[g, p], players.heading_rad[g, p], bodies.speed_mps[g, b]
+    dx, dy = bodies.x_m[g, b] - players.x_m[g, p], bodies.y_m[g, b] - players.y_m[g, p]
+    cosine, sine = np.cos(heading_rad), np.sin(heading_rad)
+    further = 1.0 + players.distance_error[g, p]
+    ahead_m, left_m = dx * cosine + dy * sine, dy * cosine - dx * sine
+    turned, closing = bodies.heading_rad[g, b] - heading_rad, players.closing_error_per_s[g, p]
     entry[OTHER.seen] = 1.0
     entry[OTHER.ahead_m], entry[OTHER.left_m] = further * ahead_m, further * left_m
-    entry[OTHER.ahead_mps] = body.speed_mps * np.cos(turned) - eye.speed_mps + closing * ahead_m
-    entry[OTHER.left_mps] = body.speed_mps * np.sin(turned) + closing * left_m
+    entry[OTHER.ahead_mps] = speed_mps * np.cos(turned) - own_mps + closing * ahead_m
+    entry[OTHER.left_mps] = speed_mps * np.sin(turned) + closing * left_m
     entry[OTHER.turned_sin], entry[OTHER.turned_cos] = np.sin(turned), np.cos(turned)
-    entry[OTHER.length_m], entry[OTHER.width_m] = body.length_m, body.width_m
-    if body.meets:
-        other_m, own_s = further * body.other_m, max(body.own_m, 0.0) / max(eye.speed_mps, 0.1)
-        entry[OTHER.own_to_conflict_m], entry[OTHER.other_to_conflict_m] = body.own_m, other_m
-        entry[OTHER.arrives_later_s] = max(other_m, 0.0) / max(body.speed_mps, 0.1) - own_s
-        entry[OTHER.has_priority] = 1.0 if body.must_yield else -1.0
+    entry[OTHER.length_m], entry[OTHER.width_m] = bodies.length_m[g, b], bodies.width_m[g, b]
+
+
+@compiled
+def _see_conflict(
+    entry: FloatArray, further: float, ways_m: tuple[float, float], speeds_mps: tuple[float, float]
+) -> None:
+    """Write the ways of the player and of another body to their conflict, and how much later the other arrives."""
+    (own_m, other_m), (own_mps, other_mps) = ways_m, speeds_mps
+    other_m *= further
+    entry[OTHER.own_to_conflict_m], entry[OTHER.other_to_conflict_m] = own_m, other_m
+    entry[OTHER.arrives_later_s] = max(other_m, 0.0) / max(other_mps, 0.1) - max(own_m, 0.0) / max(own_mps, 0.1)
 
 
 @compiled

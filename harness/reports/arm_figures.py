@@ -11,9 +11,9 @@ import numpy as np
 import pandas as pd
 from markupsafe import Markup
 
+from harness.game.arrays import FloatArray
 from harness.reports.figures import INK, SERIES, figure_of, svg
 from harness.reports.numbers import trimmed
-from harness.reports.player_data import FloatArray
 from harness.reports.run_tables import Row
 
 if TYPE_CHECKING:

@@ -10,17 +10,16 @@ from __future__ import annotations
 import base64
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
+from urllib.parse import quote
 
 import numpy as np
 from markupsafe import Markup
-from numpy.typing import NDArray
 
+from harness.game.arrays import FloatArray, IntArray
 from harness.game.roles import NON_EGO, roles_of
 from harness.reports.page_template import json_text
-from harness.reports.player_data import GameTracks, Track, key
-
-IntArray = NDArray[np.int64]
 
 
 class PackedColumn(NamedTuple):
@@ -51,10 +50,49 @@ LONGEST = 1e5
 """Metres or seconds; a longer gap or time counts as missing."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Track:
+    """The track of one road user, of its body's centre; `outcome` and `ended_step` are those of a player."""
+
+    name: str
+    """`ego`, `non_ego`, `non_ego_2` and so on, or SUMO's id of a background vehicle."""
+    size_m: tuple[float, float]
+    """Length and width."""
+    first_step: int
+    columns: Mapping[str, FloatArray]
+    """[n] values from `first_step` on, by names of `COLUMNS` and in their order: all of a player."""
+    outcome: str = ""
+    """goal, collision, rail, timeout; empty if it was still driving at the end of the game."""
+    ended_step: int | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class GameTracks:
+    """One game, step 0 to step `steps`."""
+
+    arm: str
+    persona: str
+    seed: int
+    episode: int
+    step_s: float
+    steps: int
+    outcome: str
+    """Of the judged player: the ego, or the non-ego where it drives alone."""
+    players: Sequence[Track]
+    background: Sequence[Track]
+    touches: Sequence[tuple[float, float, float]]
+    """Time (s) and place (x, y in m) of each contact."""
+
+
 Marks = Mapping[str, Sequence[Mapping[str, Any]]]
 """The manoeuvres to mark in each game, by `key`."""
 Crowds = Mapping[str, Sequence[str]]
 """The personas of each crowd, in the order of its people."""
+
+
+def key(arm: str, seed: int, episode: int) -> str:
+    """The name of a game in addresses."""
+    return f"{quote(arm, safe='')},{seed},{episode}"
 
 
 def embedded_games(games: Iterable[GameTracks], marks: Marks, crowds: Crowds, budget_bytes: int) -> dict[str, str]:

@@ -12,8 +12,8 @@ import pandas as pd
 
 from harness.evaluation.people import COLLIDED_WITH, judged
 from harness.evaluation.worst_first import worst_first
+from harness.reports.embedding import key
 from harness.reports.numbers import NO_SPACE, number
-from harness.reports.player_data import key
 
 OUTCOMES = {"rail": "contact with the rail", "timeout": "out of time", "goal": "goal reached"}
 """Outcomes in words, where the name is not clear."""

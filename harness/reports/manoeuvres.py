@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 
 from harness.evaluation.rule_book.cause_lines import event_words
-from harness.reports.player_data import key
+from harness.reports.embedding import key
 
 RUN_UP_S = 1.5
 """The player opens a game this long before what led to the failure."""

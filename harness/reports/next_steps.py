@@ -9,9 +9,9 @@ from typing import Any
 
 from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.worst_first import worst_first
+from harness.reports.embedding import key
 from harness.reports.game_links import replay_command
 from harness.reports.key_figures import egos_of
-from harness.reports.player_data import key
 from harness.reports.provenance import command_of
 from harness.reports.run_tables import RunTables, failures
 
@@ -25,7 +25,7 @@ class NextStep:
     sentence: str
     command: str = ""
     game: str = ""
-    """The key of the game to watch (`player_data.key`); empty: the step is about no game."""
+    """The key of the game to watch (`embedding.key`); empty: the step is about no game."""
 
 
 def next_steps(tables: RunTables) -> list[NextStep]:

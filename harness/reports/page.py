@@ -13,14 +13,13 @@ from harness.reports.arm_glossary import glossary
 from harness.reports.cards import CAUTION, card
 from harness.reports.data_table import table
 from harness.reports.differences import effect
-from harness.reports.embedding import embedded_games, recorded_document
+from harness.reports.embedding import GameTracks, embedded_games, recorded_document
 from harness.reports.game import game_section
 from harness.reports.game_links import GameLinks
 from harness.reports.learning import learning, searches, stopped
 from harness.reports.manoeuvres import failures_by_cause, marks_of
 from harness.reports.next_steps import first_answers, next_steps
 from harness.reports.page_template import CONTENT_POLICY, ELSEWHERE, LIBRARIES, SCRIPTS, environment_of, sources
-from harness.reports.player_data import GameTracks
 from harness.reports.provenance import asked_alone, command_of, facts, made_by, mixed_versions
 from harness.reports.run_tables import RunTables, unplayed
 

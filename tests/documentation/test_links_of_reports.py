@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.reports.player_data import key
+from harness.reports.embedding import key
 from tests.support.pages import blank_figures, campaign, recordings, rendered
 from tests.support.repository import REPOSITORY
 

@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from harness.reports.embedding import COLUMNS, NOTHING, columns_of, embedded_games, pack
-from harness.reports.player_data import key
+from harness.reports.embedding import COLUMNS, NOTHING, columns_of, embedded_games, key, pack
 from tests.support.pages import campaign
 from tests.support.recorded import recorded
 

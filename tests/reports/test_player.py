@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from harness.reports.player_data import key
+from harness.reports.embedding import key
 from tests.support.chromium import ready_s, until
 from tests.support.pages import blank_figures, campaign, recordings, rendered
 from tests.support.recorded import STEP_S, recorded

@@ -33,8 +33,8 @@ from harness.evaluation.strategies import (
 )
 from harness.evaluation.tables import table_of, typed
 from harness.replay.selection import choose_games, replay_name
+from harness.reports.embedding import GameTracks
 from harness.reports.page import render_page
-from harness.reports.player_data import GameTracks
 from harness.reports.run_tables import RunTables
 from tests.support.recorded import SCENE, causes, manoeuvres, recorded
 from tests.support.tiny import UNGATED

@@ -12,8 +12,7 @@ from harness.evaluation.tables import table_of
 from harness.evaluation.worst_first import worst_first
 from harness.game.arrays import FloatArray
 from harness.replay.selection import choose_games
-from harness.reports.embedding import COLUMNS
-from harness.reports.player_data import GameTracks, Track
+from harness.reports.embedding import COLUMNS, GameTracks, Track
 
 STEP_S, STEPS = 0.1, 80
 OUTLINE = [[0, 0], [220, 0], [220, -3.2], [130, -3.2], [100, -6.4], [0, -6.4], [0, 0]]

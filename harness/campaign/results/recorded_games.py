@@ -21,8 +21,7 @@ from harness.game.sight import TALL_WIDTH_M
 from harness.replay import choose_games
 from harness.replay.contacts import contacts
 from harness.replay.vehicles import DrawnVehicle, types_of_vehicles
-from harness.reports.embedding import BACKGROUND_COLUMNS, COLUMNS
-from harness.reports.player_data import GameTracks, Track
+from harness.reports.embedding import BACKGROUND_COLUMNS, COLUMNS, GameTracks, Track
 from harness.road.net.network import read_net
 from harness.road.scene import drawing
 from harness.road.scene.open_scene import OpenScene
