@@ -168,5 +168,4 @@ def _remaining_grip(grip_mps2: FloatArray | float, used_mps2: FloatArray) -> Flo
 
 @compiled
 def _clamped(value: FloatArray, most: FloatArray | float) -> FloatArray:
-    """[...] the value, clamped to -most ... most."""
     return np.minimum(np.maximum(value, -most), most)

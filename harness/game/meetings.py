@@ -65,8 +65,6 @@ class _Body(NamedTuple):
 
 
 class _Player(NamedTuple):
-    """A player whose conflicts are looked for."""
-
     player: int
     front_m: float  # stations of its bumpers
     rear_m: float

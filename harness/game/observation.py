@@ -168,7 +168,6 @@ def _scaled(value: float, scale: float, compressed: bool) -> float:
 
 @inlined
 def _see_own_motion(view: FloatArray, players: _Players, views: _Views, who: tuple[int, int]) -> None:
-    """Write the entries of the own motion and of the road at the player."""
     g, p = who
     view[OWN.speed_mps] = players.speed_mps[g, p]
     view[OWN.speed_limit_mps] = views.speed_limit_mps[g, p]
@@ -194,7 +193,6 @@ def _see_road(view: FloatArray, k: int, pose: tuple[OnRoute, float], routes: Rou
 
 @inlined
 def _see_stop_line(view: FloatArray, front_m: float, line: int, lines: StopLines) -> None:
-    """Write the entries of the next stop line, of a row of the table."""
     control = lines.control[line]
     view[OWN.stop_line_m] = lines.station_m[line] - front_m
     view[OWN.give_way] = 1.0 if control == Control.GIVE_WAY else 0.0
@@ -203,7 +201,6 @@ def _see_stop_line(view: FloatArray, front_m: float, line: int, lines: StopLines
 
 @compiled
 def _see_signal(view: FloatArray, signal: int, since_s: float) -> None:
-    """Write the entries of the signal of the next stop line."""
     view[OWN.signal_green] = 1.0 if signal in (Signal.GREEN, Signal.GREEN_YIELDING) else 0.0
     view[OWN.signal_yellow] = 1.0 if signal == Signal.YELLOW else 0.0
     view[OWN.signal_red] = 1.0 if signal == Signal.RED else 0.0

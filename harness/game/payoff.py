@@ -94,7 +94,6 @@ class Payoff:
         return total
 
     def _term_values(self, q: Quantities, player: int) -> FloatArray:
-        """[T + 1, G] weighted values of the terms without the fuzzy ones, and their sum."""
         names, columns = self._columns
         quantities = np.empty((len(names), len(q.state.step)))
         for row, name in enumerate(names):
@@ -102,7 +101,6 @@ class Payoff:
         return _term_values(quantities, columns, q.world.step_s)
 
     def _fuzzy_values(self, q: Quantities, player: int) -> Iterator[FloatArray]:
-        """[G] weighted value of each fuzzy term."""
         for weight, function in self.fuzzy.values():
             yield self.alpha["human"] * weight * q.world.step_s * function(getattr(q, function.quantity)[:, player])
 

@@ -97,7 +97,6 @@ def check_observation(observation: FloatArray, games: IntArray, steps: IntArray)
 
 
 def _where(game: int, steps: IntArray) -> str:
-    """The step and, if there are several games, the game."""
     return f"in step {steps[game]}" + (f" of game {game}" if len(steps) > 1 else "")
 
 

@@ -126,7 +126,6 @@ def box_cuts(box: Box, start_m: tuple[float, float], end_m: tuple[float, float])
 
 @compiled
 def _is_walled_off(start_m: tuple[float, float], end_m: tuple[float, float], walls: FloatArray) -> bool:
-    """Whether a wall crosses a straight line."""
     from_x_m, from_y_m = start_m
     way_x, way_y = end_m[0] - from_x_m, end_m[1] - from_y_m
     for s in range(len(walls)):

@@ -117,7 +117,6 @@ def draw_along_route(
 def _draw(
     routes: Routes, player: int, car: tuple[float, float], generator: np.random.Generator
 ) -> tuple[float, float, float, float, float]:
-    """A start of a player whose car has a length and a top speed."""
     length_m, max_speed_mps = car
     last_m = max(routes.goal_m[player] - _BEFORE_GOAL_M, 0.5 * length_m)
     station_m = generator.uniform(0.5 * length_m, last_m)
@@ -135,7 +134,6 @@ def _draw(
 
 
 def _apart(x_m: FloatArray, y_m: FloatArray, length_m: FloatArray, present: BoolArray) -> bool:
-    """Whether all players that are present are at least `_APART_M` from one another."""
     there = np.flatnonzero(present).tolist()
     return all(
         np.hypot(x_m[one] - x_m[other], y_m[one] - y_m[other]) >= 0.5 * (length_m[one] + length_m[other]) + _APART_M

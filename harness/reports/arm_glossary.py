@@ -22,7 +22,6 @@ def glossary(tables: RunTables) -> list[tuple[str, str]]:
 
 
 def _in_words(arm: Arm, tables: RunTables) -> str:
-    """What an arm pairs."""
     if arm.best_response_of is not None:
         player = ("the ego", "the non-ego")[arm.best_response_of]
         return f"{arm.pair.name}, {player} replaced by its best response"

@@ -85,7 +85,6 @@ def card(persona: str, place: int, tables: RunTables, links: GameLinks) -> dict[
 
 
 def _columns(persona: str, is_changed: bool, tables: RunTables, links: GameLinks) -> list[ArmColumn]:
-    """The columns of the figures, in the order of the paper's rounds."""
     name = persona if len(persona) <= LONGEST_LABEL else persona[: LONGEST_LABEL - 1] + "…"
     naive, changed = tables.arms_of("RQ2", persona)
     arms = [
@@ -136,7 +135,6 @@ def _rate(label: str, column: ArmColumn) -> dict[str, Any]:
 
 
 def _facts(persona: str, is_changed: bool, tables: RunTables) -> list[tuple[str, Sequence[str]]]:
-    """The notes of a card, as titles and lines."""
     arm = against_persona(NaiveEgo(), persona).name
     facts: list[tuple[str, Sequence[str]]] = []
     causes = {
@@ -182,7 +180,6 @@ def _sure(row: Row, rate: str) -> str:
 
 
 def _by_driver(row: Row, *, several: bool) -> str:
-    """How an ego fared against one persona of a population, a row of `populations`."""
     seed = f", seed {row['seed']}" if several else ""
     rate = f"{percent(row['failure_rate'])} of {played(row)} games"
     return f"{row['persona']}, in {row['arm']}{seed}: the ego fails in {rate} ({_sure(row, 'failure_rate')})."

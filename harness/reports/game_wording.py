@@ -94,7 +94,6 @@ def _newly_trained(persona: str) -> str:
 
 
 def _side(player: str, row: Row | None) -> str:
-    """The gap of one side of a pair, as a clause."""
     if row is None:
         return f"no best response of {player} was trained"
     match GapVerdict(row["verdict"]):
@@ -161,7 +160,6 @@ def _of_pairs(persona: str, pairs: Sequence[Sequence[Row]]) -> Answer:
 
 
 def _is_measured_response(row: Row) -> bool:
-    """Whether a row has the games of a persona's best response."""
     return not row["reason"] and row["role"] == "non_ego" and bool(row["pairs"])
 
 

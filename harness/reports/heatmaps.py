@@ -144,7 +144,6 @@ def _map(quantity: _Quantity, crossplay: pd.DataFrame, label: str, place: int, w
 
 
 def _axes(figure: Figure, egos: list[str], non_egos: list[str]) -> Axes:
-    """Axes with a row for each ego and a column for each non-ego."""
     axes = figure.subplots()
     axes.grid(False)
     for spine in axes.spines.values():

@@ -95,7 +95,6 @@ def _worst_opponent(persona: str, tables: RunTables) -> Iterator[KeyFigure]:
 
 
 def _meets_a_person(arm: Arm, ego: EgoStrategy) -> bool:
-    """Whether the arm is this ego against a person, or against the best response of one."""
     return arm.ego == ego and isinstance(arm.non_ego, PersonaNonEgo) and arm.best_response_of in (None, NON_EGO)
 
 

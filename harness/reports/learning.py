@@ -133,7 +133,6 @@ def searches(reconfiguration: pd.DataFrame) -> list[dict[str, Any]]:
 
 
 def _summary(trials: pd.DataFrame, first: Row, best: Row) -> str:
-    """What a search found, of its first and its best trial."""
     text = f"{len(trials)} trials; the best is trial {best['trial']}: {_trial(best)}. As given: {_trial(first)}."
     if best["trial"] == first["trial"]:
         text = f"{len(trials)} trials, none better than the ego as given: {_trial(first)}."
@@ -147,7 +146,6 @@ def _trial(trial: Row) -> str:
 
 
 def _figure(trials: pd.DataFrame, name: str, alternative: str) -> Markup:
-    """The mean payoff of every trial as a dot, and the best so far as a line."""
     with figure_of(3.7, 3.0) as figure:
         axes = figure.subplots()
         colour = SERIES["retrained"]

@@ -35,7 +35,6 @@ def failures_by_cause(causes: pd.DataFrame, embedded: Container[str]) -> tuple[l
 
 
 def _game(row: Any) -> dict[str, Any]:
-    """A failure of the ego, the words on it, and the time to watch it from."""
     return {
         "key": key(row.arm, row.seed, row.episode),
         "arm": row.arm,

@@ -128,7 +128,6 @@ def _acceptance(tables: RunTables) -> tuple[bool, str, list[Any]] | None:
 
 
 def _tables(tables: RunTables) -> dict[str, Any]:
-    """The tables as cells."""
     frames = {name: getattr(tables, name) for name in CAPTIONS}
     if len(tables.episodes) > MOST_ROWS:
         frames["episodes"] = tables.episodes[:0]

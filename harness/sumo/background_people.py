@@ -96,7 +96,6 @@ class BackgroundPeople:
 
 
 def _metres(edge: str, place: str) -> float:
-    """The distance of a place along an edge."""
     length_m = libsumo.lane.getLength(f"{edge}_0")
     drawn = place.endswith(EDGE_SHARE)
     metres = float(place.removesuffix(EDGE_SHARE)) * length_m if drawn else float(place)

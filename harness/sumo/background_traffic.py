@@ -63,7 +63,6 @@ class _Table:
         self.due[game] = _NEVER
 
     def _grow(self) -> None:
-        """Double the number of places; the new ones are empty."""
         for column, values in vars(self).items():
             if column != "count":
                 setattr(self, column, np.concatenate((values, values), axis=1))

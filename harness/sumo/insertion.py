@@ -194,7 +194,6 @@ def clear_of_obstacles(departures: Sequence[Departure], obstacles: Box) -> list[
 
 
 def _way(motion: Motion) -> Box:
-    """The body of a vehicle and the room before it that it needs."""
     room_m = max(CLEAR_M, CLEAR_S * motion.speed_mps)
     ahead_m = 0.5 * (room_m - motion.length_m)  # a motion is that of the front bumper
     x_m, y_m = motion.x_m + ahead_m * np.cos(motion.heading_rad), motion.y_m + ahead_m * np.sin(motion.heading_rad)

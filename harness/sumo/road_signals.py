@@ -69,7 +69,6 @@ def _state(light: str) -> str:
 
 
 def _phases(light: str) -> Sequence[libsumo.TraCIPhase]:
-    """The phases of a light's present programme."""
     current = libsumo.trafficlight.getProgram(light)
     programmes = libsumo.trafficlight.getAllProgramLogics(light)
     return next(each.phases for each in programmes if each.programID == current)

@@ -33,7 +33,6 @@ def compare_runs(before: Path, after: Path, page: Path) -> list[ComparedRow]:
 
 
 def _scene(manifest: Mapping[str, Any]) -> dict[str, str]:
-    """The hashes of the files of the run's scene."""
     scene = posixpath.basename(posixpath.normpath(manifest["campaign"]["scene"]))
     return {
         posixpath.basename(name): digest

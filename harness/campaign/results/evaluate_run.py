@@ -90,7 +90,6 @@ def _with_ends(training: pd.DataFrame, entries: Mapping[str, Mapping[str, Any]])
 
 
 def _questions(run: ReadRun) -> list[Question]:
-    """The questions that the finished arms of a run can answer."""
     return [
         question
         for question in questions(run.campaign, run.manifest["personas"], is_tuned(run.manifest))

@@ -101,7 +101,6 @@ def _file(folder: RunFolder) -> Path:
 
 
 def _results(folder: RunFolder) -> Iterator[Path]:
-    """Every file of the results: tables, report, model cards, replays."""
     yield from (folder.path / name for name in ("report.html", "result.json", "junit.xml"))
     yield from sorted(folder.path.glob("*.csv"))
     yield from sorted((folder.path / "policies").glob("*/README.md"))

@@ -126,7 +126,6 @@ def _facts(
 
 
 def _beginning(settings: Mapping[str, Any]) -> str:
-    """What a policy without an initial policy began with; `settings` are those of its training."""
     shown = min(settings.get("demonstration_steps", 0), settings["steps"] // 5)
     return f"none; it imitated a rule-based driver, shown in {shown:,} steps" if shown else "none"
 
@@ -144,7 +143,6 @@ def _given(manifest: Mapping[str, Any], campaign: Campaign) -> str:
 
 
 def _terms(profile: PersonaProfile) -> Iterator[Mapping[str, str]]:
-    """The rows of the payoff's table."""
     for each in profile.terms:
         counts = "per second" if TERMS[each.name].per_second else "per event"
         meaning = ", ".join(filter(None, (each.meaning, each.limit)))

@@ -27,8 +27,6 @@ from harness.road.scene.open_scene import OpenScene, open_scene
 
 
 class _PolicyCard(Document):
-    """The part of a policy's JSON that a card uses."""
-
     model_config = ConfigDict(extra="ignore")
     player: Literal["ego", "non_ego"]
     scene: str = Field(max_length=1000)
@@ -88,7 +86,6 @@ def read_run(folder: RunFolder, console: Console) -> ReadRun:
 
 
 def _done(manifest: Mapping[str, Any], kind: str) -> list[str]:
-    """The stages of a kind that are done."""
     entries = manifest["stages"].items()
     return [name for name, entry in entries if entry["kind"] == kind and entry["status"] == "done"]
 
@@ -113,7 +110,6 @@ def _check_log(folder: RunFolder, stage: str, entry: Mapping[str, Any]) -> None:
 
 
 def _gathered(folder: RunFolder, manifest: Mapping[str, Any], kind: str, table: str) -> Iterator[pd.DataFrame]:
-    """The tables of the stages of a kind."""
     for stage in _done(manifest, kind):
         file = folder.work(stage) / table
         frame = read_csv(file)

@@ -134,6 +134,5 @@ def scene_drawing(scene: OpenScene) -> dict[str, Any]:
 
 
 def _points(line: FloatArray) -> list[list[float]]:
-    """A line [n, 2] rounded to centimetres."""
     points: list[list[float]] = np.round(line, 2).tolist()
     return points

@@ -50,8 +50,6 @@ class GameList:
 
 @dataclass(frozen=True, kw_only=True)
 class _Page:
-    """A page of a list of games, worst first."""
-
     games: pd.DataFrame
     """Of episodes.csv: arm, seed, episode, an outcome per player, ego_min_ttc_s and severity; and the cause of a
     failure in words."""

@@ -72,7 +72,6 @@ def show(profile: PersonaProfile, console: Console) -> None:
 
 
 def _examples(function: PayoffFunction) -> Iterable[Sequence[str]]:
-    """Values of the quantity, its membership in each set, and the payoff."""
     for value in np.linspace(function.inputs[0], function.inputs[-1], EXAMPLES):
         memberships = [np.interp(value, function.inputs, membership) for _, _, membership in function.sets]
         payoff = float(np.interp(value, function.inputs, function.worth))

@@ -133,7 +133,6 @@ def _stretch(ends: Sequence[float], unit: str) -> str:
 
 
 def _attention(persona: Persona, drives: Sequence[SampleDrive]) -> Iterator[str]:
-    """The lapses of attention, and the motion of the car in a lapse."""
     attention = persona.human_factors.attention
     if attention is None:
         yield NO_LAPSES
@@ -169,7 +168,6 @@ def _drifts(crown_rad: float, bumps_rad: float, lapse_s: float) -> str:
 
 
 def _blind_spot(persona: Persona, drives: Sequence[SampleDrive]) -> Iterator[str]:
-    """The vehicles that the person does not see without a blind-spot check, and how often."""
     sight = persona.human_factors.sight
     if sight.no_blind_spot_check_share == 0.0:
         yield ALWAYS_CHECKS
@@ -185,7 +183,6 @@ def _blind_spot(persona: Persona, drives: Sequence[SampleDrive]) -> Iterator[str
 
 
 def _body(persona: Persona) -> Iterator[str]:
-    """How far and how exactly the person sees, its reaction time, and how much of the car it uses."""
     human_factors = persona.human_factors
     sight = human_factors.sight
     if sight.looked_but_failed_to_see_share:
