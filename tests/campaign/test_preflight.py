@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -12,7 +11,7 @@ from harness.campaign.preflight import QUICK_RESPONSE_STEPS, QUICK_SEGMENT_STEPS
 from harness.drivers.policy_file import write_policy
 from harness.errors import Problem, UsageError
 from tests.support.policies import some_policy
-from tests.support.tiny import CAREFUL, MERGE, SPEEDY, write_campaign, write_persona
+from tests.support.tiny import CAREFUL, MERGE, write_campaign, write_persona
 
 
 def problems_of(campaign: Path) -> list[Problem]:
@@ -94,28 +93,6 @@ def test_open_campaign__all_mistakes_are_reported_at_once_and_nothing_is_written
     assert files_in(tmp_path) == before
 
 
-def test_open_campaign__what_names_nothing_readable_is_one_problem(tmp_path: Path) -> None:
-    file = write_campaign(tmp_path, scene=None)
-    (problem,) = problems_of(file)
-    assert (problem.key, problem.message) == ("scene", "is missing")
-
-
-@pytest.mark.parametrize("changes", [{"scene": "nowhere"}, {"personas": ["nobody.toml"]}, {"ego": {"persona": "no"}}])
-def test_open_campaign__what_does_not_exist_is_named(changes: dict[str, Any], tmp_path: Path) -> None:
-    problems = problems_of(write_campaign(tmp_path, **changes))
-    assert len(problems) == 1
-    assert "there is no" in str(problems[0])
-
-
-def test_open_campaign__two_personas_of_one_name_are_refused(tmp_path: Path) -> None:
-    for folder in ("a", "b"):
-        (tmp_path / folder).mkdir()
-        write_persona(tmp_path / folder, "anna")
-    problems = problems_of(write_campaign(tmp_path, personas=["a/anna.toml", "b/anna.toml"]))
-    assert len(problems) == 2
-    assert all("'anna' too" in problem.message for problem in problems)
-
-
 @pytest.mark.parametrize(
     "names", [["naive"], ["sumo"], ["anna", "retrained_anna"], ["anna", "anna_alone"], ["naive_vs_sumo"]]
 )
@@ -136,8 +113,3 @@ def test_open_campaign__the_folder_of_a_policy(tmp_path: Path) -> None:
     (tmp_path / "policies" / "mine" / "policy.safetensors").write_bytes(b"PK")
     (problem,) = problems_of(file)
     assert Path(problem.file).name == "policy.safetensors"
-
-
-def test_open_campaign__sumo_needs_no_policy(tmp_path: Path) -> None:
-    file = write_campaign(tmp_path, ego={"driver": "sumo", "persona": str(CAREFUL)}, personas=[str(SPEEDY)])
-    assert open_campaign(file).ego_driver is None

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 import pytest
 
@@ -10,7 +12,7 @@ from harness.campaign.preflight import open_campaign
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.policy_file import Policy, persona_hash, write_policy
-from harness.errors import Problem, UsageError
+from harness.errors import UsageError
 from tests.support.policies import some_policy
 from tests.support.tiny import CAREFUL, write_campaign, write_persona
 
@@ -24,7 +26,7 @@ def anna(tmp_path: Path) -> Path:
     return write_persona(tmp_path, "anna")
 
 
-def campaign_with_policies(folder: Path, anna: Path, **hashes: str) -> Path:
+def campaign_with_policies(folder: Path, anna: Path, hashes: Mapping[str, str | None] = MappingProxyType({})) -> Path:
     """A campaign that reads its players; `hashes` replaces the persona hash of a policy, by stage name."""
     for name, player, file in (
         ("naive", "ego", CAREFUL),
@@ -38,35 +40,28 @@ def campaign_with_policies(folder: Path, anna: Path, **hashes: str) -> Path:
     return write_campaign(folder, personas=[str(anna)], policies="policies", training=None)
 
 
-def problems_of(campaign: Path) -> list[Problem]:
+@pytest.mark.parametrize(
+    "hashes", [{"naive": "0" * 64, "retrained_anna": "0" * 64}, {"anna": None}], ids=["another ego persona", "no hash"]
+)
+def test_policies__of_other_personas_are_refused_one_by_one(
+    hashes: dict[str, str | None], tmp_path: Path, anna: Path
+) -> None:
+    campaign = campaign_with_policies(tmp_path, anna)
+    assert open_campaign(campaign).policies == tmp_path / "policies"
     with pytest.raises(UsageError) as error:
-        open_campaign(campaign)
-    return error.value.problems
-
-
-def test_policies__of_the_campaigns_personas_are_read(tmp_path: Path, anna: Path) -> None:
-    assert open_campaign(campaign_with_policies(tmp_path, anna)).policies == tmp_path / "policies"
+        open_campaign(campaign_with_policies(tmp_path, anna, hashes))
+    refused = [(Path(each.file).name, each.key) for each in error.value.problems]
+    assert refused == [(f"{name}-seed1", "persona_sha256") for name in hashes]
 
 
 def test_policies__learned_by_another_payoff_are_refused(tmp_path: Path, anna: Path) -> None:
     campaign = campaign_with_policies(tmp_path, anna)
     write_persona(tmp_path, "anna", goal=2.5)
-    (problem,) = problems_of(campaign)
+    with pytest.raises(UsageError) as error:
+        open_campaign(campaign)
+    (problem,) = error.value.problems
     assert (Path(problem.file).name, problem.key) == ("anna-seed1", "persona_sha256")
     assert "another payoff or limits than the campaign's 'anna' has" in problem.message
-
-
-def test_policies__of_another_ego_persona_are_refused_one_by_one(tmp_path: Path, anna: Path) -> None:
-    wrong = "0" * 64
-    problems = problems_of(campaign_with_policies(tmp_path, anna, naive=wrong, retrained_anna=wrong))
-    assert [Path(each.file).name for each in problems] == ["naive-seed1", "retrained_anna-seed1"]
-
-
-def test_policies__without_a_hash_are_refused(tmp_path: Path, anna: Path) -> None:
-    campaign = campaign_with_policies(tmp_path, anna)
-    card = {"stage": "anna-seed1", "player": "non_ego", "persona": "anna"}
-    write_policy(Policy(some_policy().tensors, card), tmp_path / "policies" / "anna-seed1")
-    assert [each.key for each in problems_of(campaign)] == ["persona_sha256"]
 
 
 def test_persona_hash__leaves_out_what_nothing_is_learned_by(anna: Path) -> None:

@@ -68,6 +68,8 @@ def whole(steady: SeatedArm, tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(harness.campaign.execution.assessment_stage, "SEGMENT_EPISODES", 3)
         assert play(steady, folder) == (0, list(range(EPISODES)))
+    assert read_csv(folder / PLAYED)["episode"].tolist() == list(range(EPISODES))
+    assert [episode for episode, _ in read_traces(folder / "traces.parquet")] == list(range(EPISODES))
     return folder
 
 
@@ -85,11 +87,6 @@ def test_arm__killed_in_any_game_is_uninterrupted(dies_in: int, steady: SeatedAr
         play(steady, tmp_path, on_start=die)
     assert play(steady, tmp_path, AGAIN) == (0, list(range(dies_in // 3 * 3, EPISODES)))
     assert files(tmp_path) == files(whole)
-
-
-def test_arm__has_every_game_once_in_order(whole: Path) -> None:
-    assert read_csv(whole / PLAYED)["episode"].tolist() == list(range(EPISODES))
-    assert [episode for episode, _ in read_traces(whole / "traces.parquet")] == list(range(EPISODES))
 
 
 def test_arm__a_game_that_is_given_up_is_an_error_and_the_others_are_played(

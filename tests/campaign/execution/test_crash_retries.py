@@ -23,20 +23,6 @@ def crash(crashes: Crashes, stage: TrainingStage | AssessmentStage, *places: int
     return crashes.note_crash(stage, SEGV)
 
 
-def test_training__the_same_segment_again_and_again_fails_the_stage() -> None:
-    crashes = Crashes()
-    responses = [crash(crashes, TRAINING, 4) for _ in range(MOST_CRASHES)]
-    assert [response.kind for response in responses] == FAILS_AT_LAST
-    assert responses[-1].message == f"{SEGV}, {MOST_CRASHES} times"
-
-
-def test_training__that_gets_farther_between_crashes_continues() -> None:
-    crashes = Crashes()
-    for segment in range(10):
-        for _ in range(MOST_CRASHES - 1):
-            assert crash(crashes, TRAINING, segment).kind == "crashed"
-
-
 def test_crash__before_the_first_place_counts_until_the_stage_gets_farther() -> None:
     crashes = Crashes()
     for segment in range(5):

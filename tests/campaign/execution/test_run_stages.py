@@ -64,13 +64,6 @@ def test_run_stages__as_many_at_a_time_as_the_workers_take() -> None:
     assert sorted(said) == sorted(f"{kind} {name}" for kind in ("started", "done") for name in "abcde")
 
 
-def test_run_stages__a_stage_waits_for_what_it_needs_unless_that_is_finished() -> None:
-    stages = [stage("a"), stage("b", "a")]
-    assert run(stages, Scripted(capacity=2)) == ["started a", "done a", "started b", "done b"]
-    assert run(stages, Scripted(capacity=2), finished=["a"]) == ["started b", "done b"]
-    assert run(stages, Scripted(capacity=2), finished=["a", "b"]) == []
-
-
 def test_run_stages__workers_may_become_fewer() -> None:
     """As on a cluster that loses a node: what is ready waits for the workers that are left."""
     workers = Scripted(capacity=2, script={"a": [[CRASH]]})

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
 import time
 from pathlib import Path
 from typing import Any
-
-import pytest
 
 from harness.campaign.execution.run_stages import MOST_CRASHES, run_stages
 from harness.campaign.execution.stage_run import Event, StageRun
@@ -18,17 +15,14 @@ from harness.campaign.plan.stages import Stage
 from harness.errors import StageFailed
 from tests.support.plans import empty_context
 from tests.support.plans import training_of as stage
-from tests.support.processes import in_session
 from tests.support.tiny import (
-    BY_SUMO,
+    UNTRAINED,
     assert_interrupted,
     begin,
-    end,
-    harness,
-    sumo_run,
+    carried_out,
     tables,
+    untrained_run,
     wait_for,
-    wait_until_nothing_is_left,
     workers_of,
     write_campaign,
 )
@@ -70,14 +64,6 @@ def raise_in_b(stage: Stage, run: StageRun) -> dict[str, Any]:
 def die_in_b(stage: Stage, run: StageRun) -> dict[str, Any]:
     if stage.id == "b-seed1":
         os.kill(os.getpid(), signal.SIGSEGV)
-    return {}
-
-
-def die_once(stage: Stage, run: StageRun) -> dict[str, Any]:
-    mark = run.context.folder.path / stage.id
-    if not mark.exists():
-        mark.touch()
-        os.kill(os.getpid(), signal.SIGKILL)
     return {}
 
 
@@ -134,13 +120,6 @@ def test_run_stages__a_stage_that_always_kills_its_worker_fails_by_name(tmp_path
     assert told(events, "skipped") == ["c"]
 
 
-def test_run_stages__a_stage_whose_worker_was_killed_is_done_again(tmp_path: Path) -> None:
-    events = run(tmp_path, [stage("a"), stage("b", "a")], die_once)
-    assert told(events, "done") == ["a", "b"]
-    assert told(events, "crashed") == ["a", "b"]
-    assert all("SIGKILL" in event.message for event in events if event.kind == "crashed")
-
-
 def test_run_stages__a_worker_that_dies_with_nothing_to_do_is_replaced(tmp_path: Path) -> None:
     events = run(tmp_path, [stage("a"), stage("b", "a"), stage("c", "a")], die_when_idle)
     assert sorted(told(events, "done")) == ["a", "b", "c"]
@@ -176,56 +155,12 @@ def test_run_stages__short_of_memory_is_one_message_and_the_rest_goes_on(tmp_pat
 # --- the real command -------------------------------------------------------------------------------------------------
 
 
-def begin_campaign(tmp_path: Path) -> tuple[Any, Path, list[object]]:
-    """The campaign of `sumo_run`, begun anew."""
-    run_folder = tmp_path / "run"
-    command: list[object] = ["campaign", write_campaign(tmp_path, **BY_SUMO), "--out", run_folder, "--jobs", 1]
-    return begin(*command), run_folder, command
-
-
-def wait_for_file(process: subprocess.Popen[str], run_folder: Path, name: str) -> None:
-    """Wait until the training has written a file: its checkpoint stands for the first of its segments."""
-    file = run_folder / ".stages" / "speedy-seed1" / name
-    wait_for(lambda: file.exists() or process.poll() is not None, name)
-    assert file.exists(), end(process)
-
-
-@pytest.mark.slow
-def test_campaign__a_worker_that_is_killed_costs_nothing_but_time(tmp_path: Path) -> None:
-    process, run_folder, _ = begin_campaign(tmp_path)
-    wait_for_file(process, run_folder, "checkpoint.safetensors")
-    (worker,) = workers_of(process.pid)
-    os.kill(worker, signal.SIGSEGV)
-    printed = end(process)
-    assert process.returncode == 0, printed
-    assert "crashed  speedy-seed1: the worker died of SIGSEGV" in printed
-    assert tables(run_folder) == tables(sumo_run())
-    wait_until_nothing_is_left(process)
-
-
-@pytest.mark.slow
-def test_campaign__interrupted_and_killed_and_run_again_is_uninterrupted(tmp_path: Path) -> None:
-    process, run_folder, command = begin_campaign(tmp_path)
-    wait_for_file(process, run_folder, "checkpoint.safetensors")
+def test_campaign__interrupted_while_its_workers_start_is_uninterrupted_when_it_is_run_again(tmp_path: Path) -> None:
+    campaign, run_folder = write_campaign(tmp_path, **UNTRAINED), tmp_path / "run"
+    process = begin("campaign", campaign, "--out", run_folder, "--jobs", 1)
+    wait_for(lambda: workers_of(process.pid), "the first worker")
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does
     assert_interrupted(process, 130)
-    assert not (run_folder / "episodes.csv").exists()
-
-    process = begin(*command)
-    wait_for_file(process, run_folder, "done.json")
-    os.kill(process.pid, signal.SIGKILL)
-    wait_for(lambda: in_session(process.pid) in ([], [process.pid]), "no worker is left")
-    printed = end(process)
-    assert "Traceback" not in printed
-
-    again = harness(*command)
-    assert again.returncode == 0, again.stdout + again.stderr
-    assert tables(run_folder) == tables(sumo_run())
-
-
-def test_campaign__interrupted_while_its_workers_start_leaves_nothing(tmp_path: Path) -> None:
-    process, run_folder, _ = begin_campaign(tmp_path)
-    wait_for(lambda: workers_of(process.pid), "the first worker")
-    os.killpg(process.pid, signal.SIGINT)
-    assert_interrupted(process, 130)
     assert (run_folder / "manifest.json").is_file()
+    carried_out(campaign, run_folder)
+    assert tables(run_folder) == tables(untrained_run())

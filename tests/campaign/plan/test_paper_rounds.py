@@ -10,7 +10,14 @@ import pytest
 
 from harness.campaign.plan.paper_rounds import questions
 from harness.campaign.plan.plan import plan
-from harness.campaign.plan.stages import AssessmentStage, SumoDriven, Trained, TrainingStage, description
+from harness.campaign.plan.stages import (
+    AssessmentStage,
+    PreventabilityStage,
+    SumoDriven,
+    Trained,
+    TrainingStage,
+    description,
+)
 from harness.drivers.policy_file import write_policy
 from harness.game.roles import EGO, NON_EGO
 from tests.support.plans import campaign_of, planned, stages_of
@@ -23,6 +30,7 @@ def personas(tmp_path: Path) -> list[str]:
     return [str(write_persona(tmp_path, name)) for name in ("anna", "bert", "cleo")]
 
 
+ARMS_OF_NO_PERSONA = {"naive_alone", "naive_vs_sumo"}
 LEARNED_ARMS = {"{}_alone", "naive_vs_{}", "retrained_vs_{}", "retrained_alone_{}"}
 
 
@@ -32,7 +40,7 @@ def test_plan__of_a_learned_ego() -> None:
     names = {"naive", "anna", "bert", "retrained_anna", "retrained_bert"}
     assert trainings == {f"{name}-seed{seed}" for name in names for seed in (1, 7)}
     arms = {stage.id for stage in stages if isinstance(stage, AssessmentStage)}
-    names = {"naive_alone", "naive_vs_sumo", *(arm.format(who) for arm in LEARNED_ARMS for who in ("anna", "bert"))}
+    names = {*ARMS_OF_NO_PERSONA, *(arm.format(who) for arm in LEARNED_ARMS for who in ("anna", "bert"))}
     assert arms == {f"{name}-seed{seed}" for name in names for seed in (1, 7)}
 
 
@@ -97,6 +105,14 @@ def test_questions__each_persona_and_seed_is_asked_both() -> None:
     ]
 
 
+def test_plan__each_arm_of_an_ego_against_a_persona_is_judged() -> None:
+    stages = stages_of("anna", assessment={"reference_drivers": True})
+    judged = {name: each for name, each in stages.items() if isinstance(each, PreventabilityStage)}
+    assert set(judged) == {"naive_vs_anna_preventability", "retrained_vs_anna_preventability"}
+    for name, stage in judged.items():
+        assert stage.needs[0] == f"{name.removesuffix('_preventability')}-seed1"
+
+
 # --- keys -----------------------------------------------------------------------------------------------------------
 
 
@@ -130,31 +146,25 @@ def test_keys__a_persona_changes_what_it_takes_part_in(tmp_path: Path, personas:
     assert differing(keys, changed) == of_persona("bert")
 
 
-def test_keys__the_egos_persona_changes_everything(tmp_path: Path, personas: list[str]) -> None:
-    _, keys = planned(tmp_path, personas=personas[:1])
-    _, changed = planned(tmp_path, personas=personas[:1], ego={"persona": str(SPEEDY)})
-    assert differing(keys, changed) == {name.removesuffix("-seed1") for name in keys}
-
-
-def test_keys__episodes_change_assessments_only(tmp_path: Path) -> None:
-    stages, keys = planned(tmp_path)
-    _, changed = planned(tmp_path, assessment={"episodes": 5})
-    changes = {name for name in keys if keys[name] != changed[name]}
-    assert changes == {name for name, stage in stages.items() if isinstance(stage, AssessmentStage)}
-
-
-def test_keys__significance_changes_nothing_that_is_played(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({"ego": {"persona": str(SPEEDY)}}, {"naive", *ARMS_OF_NO_PERSONA, *of_persona("speedy")}),
+        ({"assessment": {"episodes": 5}}, ARMS_OF_NO_PERSONA | {arm.format("speedy") for arm in LEARNED_ARMS}),
+        ({"assessment": {"episodes": 4, "significance": 0.2}}, set()),
+        ({"non_ego_training": {"alone_share": 0.5}}, of_persona("speedy")),
+        (
+            {"retraining": {"alone_share": 0.5}},
+            {"retrained_speedy", "retrained_vs_speedy", "retrained_alone_speedy"},
+        ),
+    ],
+)
+def test_keys__a_setting_changes_what_follows_from_it(
+    changes: dict[str, Any], expected: set[str], tmp_path: Path
+) -> None:
     _, keys = planned(tmp_path)
-    _, changed = planned(tmp_path, assessment={"episodes": 4, "significance": 0.2})
-    assert changed == keys
-
-
-def test_keys__alone_shares_change_what_follows_from_them(tmp_path: Path) -> None:
-    _, keys = planned(tmp_path)
-    _, changed = planned(tmp_path, retraining={"alone_share": 0.5})
-    assert differing(keys, changed) == {"retrained_speedy", "retrained_vs_speedy", "retrained_alone_speedy"}
-    _, changed = planned(tmp_path, non_ego_training={"alone_share": 0.5})
-    assert differing(keys, changed) == of_persona("speedy")
+    _, changed = planned(tmp_path, **changes)
+    assert differing(keys, changed) == expected
 
 
 def test_keys__do_not_depend_on_where_the_campaign_lies(tmp_path: Path) -> None:
@@ -181,3 +191,13 @@ def test_keys__what_all_stages_rest_on_changes_them_all(changed: str, tmp_path: 
             file.write("\n")
     _, others = planned(tmp_path, **changes)
     assert not set(keys.values()) & set(others.values())
+
+
+def test_keys__of_judgements_depend_on_their_arms_and_no_others_on_them(tmp_path: Path) -> None:
+    _, keys = planned(tmp_path / "with", assessment={"episodes": 4, "reference_drivers": True})
+    _, keys_without = planned(tmp_path / "without")
+    assert {name: keys[name] for name in keys_without} == keys_without
+    judged = keys.keys() - keys_without.keys()
+    assert len(judged) == 2
+    _, more = planned(tmp_path / "five", assessment={"episodes": 5, "reference_drivers": True})
+    assert all(keys[name] != more[name] for name in judged)

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from harness.campaign.plan.paper_rounds import questions
-from harness.campaign.plan.stages import FixedMixture, description, driver_in
+from harness.campaign.plan.stages import description
 from harness.campaign.preflight import open_campaign
 from harness.errors import UsageError
 from tests.support.plans import campaign_of, planned, stages_of
@@ -39,15 +39,6 @@ def test_plan__a_crowd_is_met_and_trained_against_like_a_persona() -> None:
     }
     assert [*map(description, training.opponent)] == people
     assert training.needs == ("anna-seed1", "bert-seed1")
-
-
-def test_plan__a_population_draws_a_persona_for_each_place() -> None:
-    town = {"name": "town", "shares": {"anna": 1.0, "bert": 3.0}}
-    arm = stages_of("anna", "bert", population=[town])["naive_vs_town"]
-    first, *others = (driver_in(arm.non_ego, place) for place in range(3))
-    assert others == [first] * 2
-    assert isinstance(first, FixedMixture)
-    assert first.shares == (1.0, 3.0)
 
 
 def test_plan__questions_about_a_crowd_ask_each_of_its_personas_to_drive_alone() -> None:

@@ -26,6 +26,7 @@ def folder(tmp_path: Path) -> RunFolder:
 
 def results_of(folder: RunFolder) -> dict[str, bytes]:
     files = [*folder.path.glob("*.csv"), folder.path / "report.html", *folder.replays.rglob("*.*")]
+    files += folder.path.glob("policies/*/README.md")
     return {file.relative_to(folder.path).as_posix(): file.read_bytes() for file in files if file.is_file()}
 
 
@@ -43,6 +44,7 @@ def resume(folder: RunFolder) -> str:
 
 DAMAGES: dict[str, Callable[[RunFolder], object]] = {
     "a report that is missing": lambda folder: (folder.path / "report.html").unlink(),
+    "a model card that is missing": lambda folder: (folder.policy("speedy-seed1") / "README.md").unlink(),
     "a table that was edited": lambda folder: (folder.path / "summary.csv").write_bytes(b"arm\n"),
     "a replay that is missing": lambda folder: shutil.rmtree(a_replay(folder).parent),
     "a recording that was cut off": lambda folder: a_replay(folder).write_bytes(a_replay(folder).read_bytes()[:50]),

@@ -8,7 +8,6 @@ from harness.campaign.results.recorded_games import TAKE_TURNS, scene_drawing, t
 from harness.evaluation.strategies import NaiveEgo, ReconfiguredEgo, RetrainedEgo, against_persona
 from harness.road.net.network import read_net
 from harness.road.scene.drawing import lane_marks
-from harness.road.scene.open_scene import open_scene
 from tests.support.traces import game
 
 NAIVE, RETRAINED, RECONFIGURED = NaiveEgo(), RetrainedEgo(against="speedy"), ReconfiguredEgo(against="speedy")
@@ -124,9 +123,3 @@ def test_lane_marks__are_between_lanes_of_different_widths_on_either_side(build_
     # 9 m around the line y = 0, from the outer side: 4.5 to 2.5, 2.5 to -0.5, -0.5 to -4.5
     marks = [outwards * float(mark[0, 1]) for mark in lane_marks(read_net(net))]
     assert sorted(marks) == pytest.approx([-0.5, 2.5])
-
-
-def test_scene__is_opened_from_a_copy_alone(merge, tmp_path):
-    for name in ("scene.toml", "merge.net.xml", "merge.rou.xml"):
-        (tmp_path / name).write_bytes((merge.folder / name).read_bytes())
-    assert scene_drawing(open_scene(tmp_path))["goal"] == [[[175, -3.2], [175, 0]]]

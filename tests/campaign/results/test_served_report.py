@@ -48,17 +48,21 @@ def test_serve__the_page_lists_every_game_and_may_fetch_it(address: str) -> None
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", ["/manifest.json", "/games/naive_alone,1,99.json", "/games/../manifest.json", "/x"])
-def test_serve__nothing_else_is_there(path: str, address: str) -> None:
+@pytest.mark.parametrize(
+    ("path", "headers"),
+    [
+        ("/manifest.json", {}),
+        ("/games/naive_alone,1,99.json", {}),
+        ("/games/../manifest.json", {}),
+        ("/x", {}),
+        ("/", {"Host": "other.example"}),  # another site that names this machine
+    ],
+)
+def test_serve__nothing_else_is_there_and_for_another_site_nothing(
+    path: str, headers: dict[str, str], address: str
+) -> None:
     with pytest.raises(urllib.error.HTTPError) as refused:
-        read(f"{address}{path}")
-    assert refused.value.code == 404
-
-
-@pytest.mark.slow
-def test_serve__another_site_that_names_this_machine_gets_nothing(address: str) -> None:
-    with pytest.raises(urllib.error.HTTPError) as refused:
-        read(f"{address}/", Host="other.example")
+        read(f"{address}{path}", **headers)
     assert refused.value.code == 404
 
 

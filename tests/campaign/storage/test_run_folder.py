@@ -90,45 +90,16 @@ def changed(**changes: Any) -> str:
     return json.dumps({**MANIFEST, **changes})
 
 
-def stage(id: str = "naive-seed1", **changes: Any) -> str:
-    return changed(stages={id: {**MANIFEST["stages"]["naive-seed1"], **changes}})
-
-
-DAMAGED = {
-    "empty": "",
-    "truncated": changed()[:-20],
-    "a list": "[]",
-    "a number": "7",
-    "nothing": "{}",
-    "deeply nested": "[" * 100_000,
-    "without a format": changed(format=None),
-    "without a name": changed(name=None),
-    "without a campaign": changed(campaign=None),
-    "without seeds": changed(seeds=[]),
-    "with odd seeds": changed(seeds=["../x"]),
-    "without personas": changed(personas=None),
-    "with a list of stages": changed(stages=[]),
-    "with a stage of another name": stage("speedy-seed1"),
-    "with a stage outside": stage("../../x-seed1", name="../../x"),
-    "with a stage of no kind": stage(kind="dance"),
-    "with a stage of no status": stage(status=None),
-    "with a stage that is a number": changed(stages={"naive-seed1": 1}),
-    "with a stage of an unknown persona": stage(persona="nobody"),
-    "with a training that does not say how it stopped": stage(status="done"),
-    "without the version of the harness": changed(versions={}),
-    "with a campaign of an unknown key": changed(campaign={**MANIFEST["campaign"], "colour": 1}),
-    "with a persona of nothing": changed(persona_documents={"speedy": {}}),
-}
-
-
-@pytest.mark.parametrize("name", DAMAGED)
-def test_manifest__a_damaged_one_is_named(name: str, folder: RunFolder) -> None:
-    folder.manifest_file.write_text(DAMAGED[name])
+@pytest.mark.parametrize(
+    "content", ["", changed()[:-20], "[]", "[" * 100_000, changed(stages={"../x-seed1": {}}), changed(versions={})]
+)
+def test_manifest__a_damaged_one_is_named_and_left_as_it_is(content: str, folder: RunFolder) -> None:
+    folder.manifest_file.write_text(content)
     problem = problem_of(folder.manifest)
     assert problem.startswith(str(folder.manifest_file))
     assert "damaged" in problem
     assert problem_of(lambda: folder.claim("tiny")) == problem
-    assert folder.manifest_file.read_text() == DAMAGED[name]
+    assert folder.manifest_file.read_text() == content
 
 
 def test_manifest__of_another_format_is_refused_in_one_line(folder: RunFolder) -> None:
