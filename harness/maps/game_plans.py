@@ -14,7 +14,7 @@ from sumolib.net import Net
 from harness.game.arrays import FloatArray
 from harness.game.road import SPACING_M
 from harness.maps.candidates import Candidate, CandidateKind, LaneWay, candidates, following
-from harness.maps.planned_routes import PlannedRoute, following_m, meeting_near, planned_route, sampled_to, way_over
+from harness.maps.planned_routes import PlannedRoute, following_m, planned_route, sampled_to, way_over
 from harness.road.net.route_table import meeting_of_lines
 
 Range = tuple[float, float]
@@ -200,8 +200,11 @@ class Plans:
 
 def _timed(candidate: Candidate, *, ego_route: PlannedRoute, route: PlannedRoute, within_m: float) -> GamePlan | None:
     """The plan in which both arrive within `_APART_S` of each other; None if the routes leave no room for it."""
-    found = meeting_near(ego_route, route, candidate.place, within_m)
+    found = meeting_of_lines(ego_route.line, route.line)
     if found is None:
+        return None
+    point = ego_route.line[min(round(found.ego_m / SPACING_M), len(ego_route.line) - 1)]
+    if float(np.hypot(*(point - candidate.place))) > within_m:
         return None
     for slower, seconds in _TRIES:
         speed, other = _speeds(ego_route.limit_mps, slower), _speeds(route.limit_mps, slower)

@@ -17,7 +17,7 @@ from harness.game.arrays import FloatArray
 from harness.game.road import SPACING_M
 from harness.maps.candidates import Candidate, LaneWay, for_cars
 from harness.road.net.network import lane_line
-from harness.road.net.route_table import Meeting, meeting_of_lines, route_line
+from harness.road.net.route_table import route_line
 
 BEYOND_M = 45.0  # of the goal behind the junction
 _ROOM_M = 8.0  # behind a goal, at the end of the last edge
@@ -108,15 +108,6 @@ def sampled_to(line: shapely.LineString, until_m: float) -> FloatArray:
     """[n, 2] points of a line every `SPACING_M` up to a station."""
     stations = np.arange(0.0, until_m + 1e-6, SPACING_M)
     return np.asarray(shapely.get_coordinates(shapely.line_interpolate_point(line, stations)))
-
-
-def meeting_near(ego: PlannedRoute, other: PlannedRoute, place: FloatArray, within_m: float) -> Meeting | None:
-    """Where two routes meet first; None if that is not within a distance of a place."""
-    found = meeting_of_lines(ego.line, other.line)
-    if found is None:
-        return None
-    point = ego.line[min(round(found.ego_m / SPACING_M), len(ego.line) - 1)]
-    return found if float(np.hypot(*(point - place))) <= within_m else None
 
 
 def _previous(way: LaneWay | None, edges: Sequence[Edge], rings: Collection[str]) -> Connection | None:

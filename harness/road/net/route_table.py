@@ -17,7 +17,8 @@ from sumolib.net.connection import Connection
 from sumolib.net.edge import Edge
 from sumolib.net.lane import Lane
 
-from harness.game.arrays import FloatArray
+from harness.config.road_user import WALKING_MPS
+from harness.game.arrays import BoolArray, FloatArray
 from harness.game.road import MARGIN_M, SPACING_M, Route
 from harness.road.net.network import car_lanes, connection_lines, inner_lanes, lane_line
 from harness.road.net.own_lanes import LanesOf, own_side
@@ -61,7 +62,7 @@ def junctions_on_route(net: Net, edges: Sequence[Edge], lanes_of: LanesOf = car_
     lanes that the player may use."""
     if len(edges) < 2:
         return []
-    starts = _join([piece.line for piece in _pieces(net, edges, lanes_of)])[1].tolist()
+    _, starts = route_line(net, edges, lanes_of)
     return [
         JunctionOnRoute(
             link=link,
@@ -105,8 +106,7 @@ def route_table(
     pieces = _pieces(net, edges, lanes_of)
     points, starts = _join([piece.line for piece in pieces])
     line = shapely.LineString(points)
-    stations = np.arange(-MARGIN_M, line.length + MARGIN_M + SPACING_M, SPACING_M)
-    points, headings = sampled(line, stations)
+    stations, inside, points, headings = _sampled(line)
     piece_at = np.clip(np.searchsorted(starts, stations, side="right") - 1, 0, len(pieces) - 1)
 
     ends = _lane_ends(edges, lanes_of, [starts[2 * k] + _length(pieces[2 * k].line) for k in range(len(edges))])
@@ -118,25 +118,47 @@ def route_table(
         for column, (lane_points, lane) in enumerate(piece.lanes):
             offsets[rows, column] = _offsets(points[rows], headings[rows], lane_points)
             lane_ends[rows, column] = ends[piece.edge][lane.getID()]
-    left, right = road_edges(area, points, headings)
+    left, right = _road_edges(area, points, headings)
     widths = np.array([max((lane.getWidth() for _, lane in piece.lanes), default=0.0) for piece in pieces])[piece_at]
     on_edge = ~np.array([piece.is_junction for piece in pieces])[piece_at]
     own_left, own_right = own_side(net, points, headings, offsets_m=offsets, width_m=widths, on_edge=on_edge)
-    inside = (stations >= 0.0) & (stations <= line.length)
     row = 2 * list(edges).index(goal)
     return Route(
         x_m=points[:, 0],
         y_m=points[:, 1],
         heading_rad=headings,
-        left_edge_m=extended(left, inside),
-        right_edge_m=extended(right, inside),
-        own_left_m=extended(own_left, inside),
-        own_right_m=extended(own_right, inside),
+        left_edge_m=_extended(left, inside),
+        right_edge_m=_extended(right, inside),
+        own_left_m=_extended(own_left, inside),
+        own_right_m=_extended(own_right, inside),
         speed_limit_mps=np.array([pieces[k].speed_mps for k in piece_at]),
         lane_offset_m=offsets,
         lane_end_m=lane_ends,
         length_m=line.length,
         goal_m=starts[row] + goal_position_m / goal.getLength() * _length(pieces[row].line),
+    )
+
+
+def way_table(way: FloatArray, area: BaseGeometry) -> Route:
+    """The table of a way [n, 2] over a surface: a single lane along the way, whose limit is a comfortable walk. The
+    goal is its end."""
+    line = shapely.LineString(way)
+    stations, inside, points, headings = _sampled(line)
+    left, right = _road_edges(area, points, headings)
+    count = len(stations)
+    return Route(
+        x_m=points[:, 0],
+        y_m=points[:, 1],
+        heading_rad=headings,
+        left_edge_m=_extended(left, inside),
+        right_edge_m=_extended(right, inside),
+        own_left_m=np.full(count, np.inf),
+        own_right_m=np.full(count, -np.inf),
+        speed_limit_mps=np.full(count, WALKING_MPS),
+        lane_offset_m=np.zeros((count, 1)),
+        lane_end_m=np.full((count, 1), np.inf),
+        length_m=line.length,
+        goal_m=line.length,
     )
 
 
@@ -218,8 +240,10 @@ def _join(lines: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
     return points[keep], np.cumsum(steps)[first]
 
 
-def sampled(line: shapely.LineString, stations: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Points [N, 2] and headings [N] of a line at stations [N], extended straight at both ends."""
+def _sampled(line: shapely.LineString) -> tuple[FloatArray, BoolArray, FloatArray, FloatArray]:
+    """The stations [N] of a route's table, whether they are on its line, and the points [N, 2] and headings [N] there.
+    The line is extended straight at both ends."""
+    stations = np.arange(-MARGIN_M, line.length + MARGIN_M + SPACING_M, SPACING_M)
     within = np.clip(stations, 0.0, line.length)
 
     def at(station: FloatArray) -> FloatArray:
@@ -228,7 +252,8 @@ def sampled(line: shapely.LineString, stations: FloatArray) -> tuple[FloatArray,
     chord = at(np.minimum(within + SPACING_M, line.length)) - at(np.maximum(within - SPACING_M, 0.0))
     headings = np.arctan2(chord[:, 1], chord[:, 0])
     beyond = stations - within
-    return at(within) + beyond[:, None] * np.stack((np.cos(headings), np.sin(headings)), axis=1), headings
+    points = at(within) + beyond[:, None] * np.stack((np.cos(headings), np.sin(headings)), axis=1)
+    return stations, within == stations, points, headings
 
 
 # --- lanes and road edges --------------------------------------------------------------------------------------------
@@ -255,7 +280,7 @@ def _offsets(points: FloatArray, headings: FloatArray, lane_points: FloatArray) 
     return dy * np.cos(headings) - dx * np.sin(headings)
 
 
-def road_edges(area: BaseGeometry, points: FloatArray, headings: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _road_edges(area: BaseGeometry, points: FloatArray, headings: FloatArray) -> tuple[FloatArray, FloatArray]:
     """[N] lateral offsets of the drivable area's left (positive) and right (negative) edges from each point."""
     if shapely.get_num_coordinates(area) <= _FEW_POINTS:
         return _edges_of(area, points, headings)
@@ -282,7 +307,7 @@ def _edges_of(area: BaseGeometry, points: FloatArray, headings: FloatArray) -> t
     return sides[0], sides[1]
 
 
-def extended(values: FloatArray, inside: FloatArray) -> FloatArray:
+def _extended(values: FloatArray, inside: BoolArray) -> FloatArray:
     """[N] values whose entries before the start and beyond the end of the route repeat those at its start and end."""
     rows = np.flatnonzero(inside)
     first, last = rows[0] + 1, rows[-1] - 1

@@ -11,15 +11,15 @@ from shapely.geometry.base import BaseGeometry
 from sumolib.net import Net
 from sumolib.net.node import Node
 
-from harness.config.road_user import WALKER_LENGTH_M, WALKER_WIDTH_M, WALKING_MPS
+from harness.config.road_user import WALKER_LENGTH_M, WALKER_WIDTH_M
 from harness.config.scene import Scene
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray
 from harness.game.rails import RASTER_M, Raster
-from harness.game.road import MARGIN_M, SPACING_M, Route
+from harness.game.road import MARGIN_M
 from harness.road.net import surface
 from harness.road.net.network import lane_line
-from harness.road.net.route_table import extended, road_edges, sampled
+from harness.road.net.route_table import way_table
 from harness.road.net.stream import USERS
 from harness.road.net.walker_conflicts import WalkersWay, follows_crossing, stripes, ways_of
 from harness.road.scene.open_player import OpenPlayer
@@ -138,28 +138,3 @@ def _junction_crossed(net: Net, way: shapely.LineString, *, marked: bool) -> str
 
 def _has_signals(node: Node) -> bool:
     return any(link.getTLSID() for link in node.getConnections())
-
-
-def way_table(way: FloatArray, area: BaseGeometry) -> Route:
-    """The table of a way [n, 2] over a surface: a single lane along the way, whose limit is a comfortable walk. The
-    goal is its end."""
-    line = shapely.LineString(way)
-    stations = np.arange(-MARGIN_M, line.length + MARGIN_M + SPACING_M, SPACING_M)
-    points, headings = sampled(line, stations)
-    left, right = road_edges(area, points, headings)
-    inside = (stations >= 0.0) & (stations <= line.length)
-    count = len(stations)
-    return Route(
-        x_m=points[:, 0],
-        y_m=points[:, 1],
-        heading_rad=headings,
-        left_edge_m=extended(left, inside),
-        right_edge_m=extended(right, inside),
-        own_left_m=np.full(count, np.inf),
-        own_right_m=np.full(count, -np.inf),
-        speed_limit_mps=np.full(count, WALKING_MPS),
-        lane_offset_m=np.zeros((count, 1)),
-        lane_end_m=np.full((count, 1), np.inf),
-        length_m=line.length,
-        goal_m=line.length,
-    )
