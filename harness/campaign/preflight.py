@@ -189,7 +189,6 @@ def _relative(campaign_file: Path, path: Path) -> str:
 
 
 def _same_names(file: Path, written: Sequence[str], personas: Sequence[Persona | None]) -> Iterator[Problem]:
-    """A problem for each persona whose name another one has."""
     names = [each.name for each in personas if each is not None]
     for path, persona in zip(written, personas, strict=True):
         if persona is not None and names.count(persona.name) > 1:
@@ -198,7 +197,6 @@ def _same_names(file: Path, written: Sequence[str], personas: Sequence[Persona |
 
 
 def _games_at_once(document: Campaign | None, ego_driver: ExternalDriver) -> int:
-    """The number of games that the ego will have to play at once."""
     if document is None:
         return 1
     search = document.reconfiguration
@@ -241,7 +239,6 @@ def _find_other_egos(
 
 
 def _quickened(document: Campaign) -> Campaign:
-    """The same campaign with fewer training steps, and fewer trials."""
     training, search, response = document.training, document.reconfiguration, document.best_response
     steps = {
         "steps": min(training.steps, QUICK_STEPS),

@@ -88,7 +88,6 @@ def check_policies(
 
 
 def _find_and_try(place: Path, allow_code: bool, car: Car, sampled: bool) -> ExternalDriver:
-    """The policy of others that a driver document describes, tried out."""
     driver = find_driver(place.name, place, "", allow_code)
     if driver.vehicle_type is not None:
         message, remedy = "SUMO's models are no policy", "name them as the ego: [ego] driver"

@@ -147,7 +147,6 @@ class PinnedGames:
         return self._episodes[(self._episodes["error"] == "") & (self._episodes["ego_failed"] == 1)]
 
     def _passing(self, stage: AssessmentStage, failing: FloatArray) -> Iterator[FloatArray]:
-        """The starts of the arm's games without a failure, nearest to a failing start first."""
         games = self._episodes
         of_arm = (games["arm"] == stage.name) & (games["seed"] == stage.seed)
         passed = games.loc[of_arm & (games["error"] == "") & (games["ego_failed"] == 0), "episode"]
@@ -164,7 +163,6 @@ class PinnedGames:
         return np.concatenate((drawn.position_m, drawn.speed_mps))
 
     def _write(self, place: str, content: bytes) -> str:
-        """Write a file of the folder; its SHA-256."""
         make_folder((self._out / place).parent)
         write_atomically(self._out / place, content)
         return hashlib.sha256(content).hexdigest()

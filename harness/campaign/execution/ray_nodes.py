@@ -110,7 +110,6 @@ def token_file(run: RunFolder) -> Path:
 
 
 def _needed_files(context: RunContext) -> list[Path]:
-    """What stages read outside of the run folder."""
     drivers = [each for each in (context.ego_driver, *context.other_egos.values()) if each is not None]
     policies = [context.policies] if context.policies is not None else []
     return [*policies, *(Path(file) for driver in drivers for file in driver.files)]

@@ -246,7 +246,6 @@ def _cause(errors: Any, error: Exception, node: Node) -> str:
 
 
 def _carry_out(stage: Stage, attempt: Attempt, *, context: RunContext, work: Work, number: int, inbox: Any) -> Event:
-    """Carry a stage out in a process of Ray."""
     import ray
 
     def send(event: Event) -> None:

@@ -146,7 +146,6 @@ def policies_of_run(run: Path, written: str | None, hashes: Mapping[str, str]) -
 
 
 def _holds(folder: Path, read: Mapping[str, str]) -> bool:
-    """Whether a folder has these files, by their path in it, with these checksums."""
     try:
         return all(digest_of_file(folder / place) == digest for place, digest in read.items())
     except OSError:

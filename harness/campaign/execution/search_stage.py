@@ -48,7 +48,6 @@ def carry_out_search(stage: SearchStage, run: StageRun, scene: OpenScene) -> tup
 
 
 def _write_driver(stage: SearchStage, spec: SearchSpec, trials: Sequence[Trial], folder: Path) -> None:
-    """Write the driver with the parameters of the best trial, as a document for campaigns."""
     chosen = best(trials)
     first, found = trials[0], trials[chosen]
     comments = [
@@ -63,7 +62,6 @@ def _write_driver(stage: SearchStage, spec: SearchSpec, trials: Sequence[Trial],
 
 
 def _write_table(trials: Sequence[Trial], searched: Sequence[Tunable], labels: Mapping[str, Any], file: Path) -> None:
-    """A row for each trial and parameter."""
     chosen, best_payoff = best(trials), float("-inf")
     rows = []
     for number, trial in enumerate(trials):

@@ -90,7 +90,6 @@ def _places(stage: TrainingStage, players: PlayerFactory) -> tuple[LearningPlace
 
 
 def _policy_card(stage: TrainingStage, spec: TrainingSpec) -> dict[str, Any]:
-    """What `policy.json` says of how a policy came about."""
     return {
         "stage": stage.id,
         "player": ROLES[stage.learner],

@@ -172,7 +172,6 @@ class WorkerPool:
 
 
 def _wait_for(worker: _Worker) -> int:
-    """Wait for a worker that is ending; its exit code."""
     try:
         worker.process.wait(_END_S)
     except subprocess.TimeoutExpired:

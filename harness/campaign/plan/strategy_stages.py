@@ -118,7 +118,6 @@ class SeedStages:
                 return self._learned(strategy)
 
     def _learned(self, strategy: EgoStrategy | NonEgoStrategy, persona: str = "") -> Trained | TrainedBefore:
-        """The policy of a training stage: made by this plan, or read from the campaign's folder of policies."""
         stage = stage_id(strategy_name(strategy), self.seed)
         if self.campaign.policies is None:
             return Trained(stage=stage, persona=persona)
