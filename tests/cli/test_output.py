@@ -37,6 +37,7 @@ def test_check__json_has_the_stages(tmp_path: Path) -> None:
     stages = {each["stage"]: each for each in checked["stages"]}
     assert stages["naive_vs_speedy-seed1"]["after"] == ["speedy-seed1"]
     assert {each["kind"] for each in checked["stages"]} == {"training", "assessment"}
+    assert as_json("check", MERGE)["scene"] == str(MERGE)
 
 
 def test_check__json_has_the_problems(tmp_path: Path) -> None:
@@ -46,10 +47,6 @@ def test_check__json_has_the_problems(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert (problem["file"], problem["key"]) == (str(file), "seeds[0]")
     assert problem["message"] in done.stderr
-
-
-def test_check__json_of_a_scene() -> None:
-    assert as_json("check", MERGE)["scene"] == str(MERGE)
 
 
 def test_campaign__json_is_the_result_and_nothing_else_is_on_stdout(tmp_path: Path, run: Path) -> None:

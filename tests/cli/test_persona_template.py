@@ -158,18 +158,11 @@ def test_check__the_template_is_refused_until_it_is_filled_in(tmp_path: Path) ->
     ]
 
 
-@pytest.mark.parametrize(
-    ("statistic", "citation", "message"),
-    [
-        ("TODO: find a figure", "Author (2020): Title", "sources[0].statistic: is a placeholder"),
-        ("12 % of them are late.", "TBD ...", "sources[0].citation: is a placeholder"),
-    ],
-)
-def test_check__a_source_that_is_no_evidence_is_refused(
-    statistic: str, citation: str, message: str, tmp_path: Path
-) -> None:
+def test_check__a_source_that_is_no_evidence_is_refused(tmp_path: Path) -> None:
     text = create_persona("late", tmp_path / "late.toml").read_text()
     source = tomllib.loads(text)["sources"][0]
-    written = text.replace(source["statistic"], statistic).replace(source["citation"], citation)
+    written = text.replace(source["statistic"], "TODO: find a figure").replace(source["citation"], "TBD ...")
     (tmp_path / "late.toml").write_text(written)
-    assert message in refusal(tmp_path / "late.toml")
+    found = refusal(tmp_path / "late.toml")
+    assert "sources[0].statistic: is a placeholder" in found
+    assert "sources[0].citation: is a placeholder" in found

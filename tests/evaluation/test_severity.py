@@ -51,23 +51,35 @@ def cells_of(world: World, trace: pd.DataFrame) -> dict[str, Any]:
 # --- contacts -----------------------------------------------------------------------------------------------------
 
 
-def test_contact__rear_end_of_equal_cars_shares_the_closing_speed(merge: Any) -> None:
-    # 14 m/s into 4 m/s: both go on at 9 m/s; the gap is 1.5 m at the start and -0.5 m after 2 steps
-    ego = rows("ego", along(20.0, -1.6, 0.0, 14.0, 3), end="collision")
-    cells = severity(merge, ego, rows("non_ego", along(26.5, -1.6, 0.0, 4.0, 3)))
-    assert cells["closing_speed_mps"] == pytest.approx(10.0)
-    assert (cells["ego_delta_v_mps"], cells["other_delta_v_mps"]) == (pytest.approx(5.0), pytest.approx(5.0))
-    assert cells["impact_side"] == "front"
+@pytest.mark.parametrize(
+    ("speed_mps", "other", "expected"),
+    [
+        # 14 m/s into 4 m/s: both go on at 9 m/s; the gap is 1.5 m at the start and -0.5 m after 2 steps
+        (
+            14.0,
+            rows("non_ego", along(26.5, -1.6, 0.0, 4.0, 3)),
+            {"closing_speed_mps": 10.0, "ego_delta_v_mps": 5.0, "other_delta_v_mps": 5.0, "severity": 305.0},
+        ),
+        # 70 kg at rest, 1500 kg at 10 m/s: 10 * 1500 / 1570 = 9.554
+        (
+            10.0,
+            rows("walker", along(24.5, -1.6, QUARTER, 0.0, 3), kind="foot"),
+            {"other_delta_v_mps": 9.554, "severity": 309.554},
+        ),
+        # ego 12 m/s east, the other 5 m/s north: 13 m/s; it reaches the ego's right side at y = -1.6 - 0.9
+        (
+            12.0,
+            rows("non_ego", along(22.0, -5.9, QUARTER, 5.0, 3)),
+            {"closing_speed_mps": 13.0, "ego_delta_v_mps": 6.5, "impact_side": "right"},
+        ),
+    ],
+    ids=["rear end of equal cars", "pedestrian", "crossing car"],
+)
+def test_contact__by_hand(speed_mps: float, other: list[dict], expected: dict[str, Any], merge: Any) -> None:
+    cells = severity(merge, rows("ego", along(20.0, -1.6, 0.0, speed_mps, 3), end="collision"), other)
     assert cells["near_miss"] == 0
-    assert cells["severity"] == pytest.approx(305.0)
-
-
-def test_contact__a_pedestrian_decides_how_severe_it_is(merge: Any) -> None:
-    # 70 kg at rest, 1500 kg at 10 m/s: 10 * 1500 / 1570 = 9.554
-    ego = rows("ego", along(20.0, -1.6, 0.0, 10.0, 3), end="collision")
-    cells = severity(merge, ego, rows("walker", along(24.5, -1.6, QUARTER, 0.0, 3), kind="foot"))
-    assert cells["other_delta_v_mps"] == pytest.approx(9.554, abs=1e-3)
-    assert cells["severity"] == pytest.approx(309.554, abs=1e-3)
+    for name, value in expected.items():
+        assert cells[name] == (value if isinstance(value, str) else pytest.approx(value, abs=1e-3))
 
 
 def test_contact__a_player_on_foot_weighs_a_person() -> None:
@@ -83,15 +95,6 @@ def test_contact__an_obstacle_does_not_move(merge: Any) -> None:
     world = replace(merge.world, hiding=Hiding(obstacles=np.array([False])))
     cells = cells_of(world, trace)
     assert (cells["ego_delta_v_mps"], cells["other_delta_v_mps"]) == (pytest.approx(10.0), 0.0)
-
-
-def test_contact__a_crossing_car_adds_its_velocity_at_right_angles(merge: Any) -> None:
-    # ego 12 m/s east, the other 5 m/s north: 13 m/s; it reaches the ego's right side at y = -1.6 - 0.9
-    ego = rows("ego", along(20.0, -1.6, 0.0, 12.0, 3), end="collision")
-    cells = severity(merge, ego, rows("non_ego", along(22.0, -5.9, QUARTER, 5.0, 3)))
-    assert cells["closing_speed_mps"] == pytest.approx(13.0)
-    assert cells["ego_delta_v_mps"] == pytest.approx(6.5)
-    assert cells["impact_side"] == "right"
 
 
 @pytest.mark.parametrize(

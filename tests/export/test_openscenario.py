@@ -9,7 +9,6 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
-import pandas as pd
 import pytest
 import xmlschema
 
@@ -21,6 +20,7 @@ from tests.support.exports import bicycle_game, exported, merge_with_vans, signa
 from tests.support.replays import GAMES, STEP_S, busy_game, collision_game, drive, game, straight
 
 ROAD = RoadFile(xml=b"", signals={"crossing": {link: link + 1 for link in range(12)}})
+OTHERS = {"walker": walker_game, "bicycle": bicycle_game, "signals": signals_game}
 Valid = Callable[[bytes], list[str]]
 
 
@@ -55,16 +55,10 @@ def course_of(root: ElementTree.Element, name: str) -> np.ndarray:
     return np.array(rows)
 
 
-@pytest.mark.parametrize("name", GAMES)
+@pytest.mark.parametrize("name", [*GAMES, *OTHERS])
 def test_scenario__is_valid(name: str, scene: OpenScene, mistakes: Valid) -> None:
-    assert mistakes(scenario_file(exported(GAMES[name](), scene), ROAD)) == []
-
-
-@pytest.mark.parametrize("drawn", [walker_game, bicycle_game, signals_game])
-def test_scenario__of_other_road_users_is_valid(
-    drawn: Callable[[], tuple[pd.DataFrame, OpenScene]], mistakes: Valid
-) -> None:
-    assert mistakes(scenario_file(exported(*drawn()), ROAD)) == []
+    trace, of_game = OTHERS[name]() if name in OTHERS else (GAMES[name](), scene)
+    assert mistakes(scenario_file(exported(trace, of_game), ROAD)) == []
 
 
 def test_course__is_that_of_the_middle_of_the_rear_axle(scene: OpenScene) -> None:

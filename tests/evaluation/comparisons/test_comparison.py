@@ -226,16 +226,17 @@ def test_compare__rejects_random_arms_without_a_difference_at_the_rate_of_signif
     )
 
 
-def test_holm__agrees_with_the_arithmetic_on_paper():
-    # ascending: 0.005 * 4 = 0.02; 0.01 * 3 = 0.03; 0.03 * 2 = 0.06; 0.04 * 1 = 0.04 -> 0.06, it may not fall
-    adjusted = holm(np.array([0.01, 0.04, 0.03, 0.005]))
-    assert adjusted.tolist() == pytest.approx([0.03, 0.06, 0.06, 0.02])
-
-
-def test_holm__leaves_out_what_was_not_tested_and_caps_at_one():
-    # two tests: 0.4 * 2 = 0.8; 0.9 * 1 = 0.9; and three of 0.5: 1.5 -> 1
-    assert holm(np.array([0.9, math.nan, 0.4])).tolist() == pytest.approx([0.9, math.nan, 0.8], nan_ok=True)
-    assert holm(np.array([0.5, 0.5, 0.5])).tolist() == [1, 1, 1]
+@pytest.mark.parametrize(
+    ("p_values", "adjusted"),
+    [
+        # ascending: 0.005 * 4 = 0.02; 0.01 * 3 = 0.03; 0.03 * 2 = 0.06; 0.04 * 1 = 0.04 -> 0.06, it may not fall
+        ([0.01, 0.04, 0.03, 0.005], [0.03, 0.06, 0.06, 0.02]),
+        ([0.9, math.nan, 0.4], [0.9, math.nan, 0.8]),  # two tests: 0.4 * 2 = 0.8; 0.9 * 1 = 0.9
+        ([0.5, 0.5, 0.5], [1, 1, 1]),
+    ],
+)
+def test_holm__agrees_with_the_arithmetic_on_paper(p_values, adjusted):
+    assert holm(np.array(p_values)).tolist() == pytest.approx(adjusted, nan_ok=True)
 
 
 @given(p_value_lists)
