@@ -86,28 +86,21 @@ def test_start__has_noise_and_lapses_for_every_step(start_distribution: StartDis
     assert [each.lapsed.shape for each in start.lapses] == [(250,), (250,)]
 
 
-def place(line: list[tuple[float, float]], scale: float = 1.0) -> StartRange:
-    return StartRange(line=np.array(line), place=OnLine((0.0, 1.0)), speed_mps=(0.0, 1.0), scale=scale)
-
-
 @pytest.mark.parametrize(
-    ("position", "x", "y", "heading"),
+    ("position", "scale", "pose"),
     [
-        (6.0, 4.0, 0.0, 0.0),  # bumper at (6, 0), centre 2 m behind
-        (12.0, 10.0, 0.0, np.pi / 2),  # bumper at (10, 2), 2 m round the corner
-        (15.0, 10.0, 3.0, np.pi / 2),
-        (1.0, -1.0, 0.0, 0.0),  # the rear may stand before the lane's start
-        (20.0, 10.0, 8.0, np.pi / 2),  # the very end
+        (6.0, 1.0, (4.0, 0.0, 0.0)),  # bumper at (6, 0), centre 2 m behind
+        (12.0, 1.0, (10.0, 0.0, np.pi / 2)),  # bumper at (10, 2), 2 m round the corner
+        (15.0, 1.0, (10.0, 3.0, np.pi / 2)),
+        (1.0, 1.0, (-1.0, 0.0, 0.0)),  # the rear may stand before the lane's start
+        (20.0, 1.0, (10.0, 8.0, np.pi / 2)),  # the very end
+        (30.0, 0.5, (10.0, 3.0, np.pi / 2)),  # the lane has a length of 40 m in SUMO: 30 m are 15 m along its shape
     ],
 )
-def test_pose__along_a_lane_that_bends(position: float, x: float, y: float, heading: float) -> None:
-    pose = place([(0.0, 0.0), (10.0, 0.0), (10.0, 10.0)]).pose(position, 4.0)
-    assert pose == pytest.approx((x, y, heading))
-
-
-def test_pose__uses_sumos_lane_length() -> None:
-    # the lane has a length of 40 m in SUMO and a shape of 20 m: 30 m along the lane are 15 m along its shape
-    assert place([(0.0, 0.0), (20.0, 0.0)], scale=0.5).pose(30.0, 4.0) == pytest.approx((13.0, 0.0, 0.0))
+def test_pose__along_a_lane_that_bends(position: float, scale: float, pose: tuple[float, ...]) -> None:
+    line = np.array([(0.0, 0.0), (10.0, 0.0), (10.0, 10.0)])
+    place = StartRange(line=line, place=OnLine((0.0, 1.0)), speed_mps=(0.0, 1.0), scale=scale)
+    assert place.pose(position, 4.0) == pytest.approx(pose)
 
 
 PART = st.one_of(st.text(max_size=5), st.integers(-5, 5))

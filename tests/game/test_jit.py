@@ -8,7 +8,6 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import numba
 import numpy as np
@@ -86,18 +85,14 @@ def test_compiling__is_counted_by_own_functions(
     assert set(counts) == {(0, 1)}
 
 
-def test_turn__does_not_need_a_writable_folder(cache: Path) -> None:
-    cache.write_text("a file, not a folder")
-    with jit._turn(cache), jit._turn(cache):  # a function and one that it calls
-        pass
-
-
-def test_turn__does_not_need_locks_of_the_file_system(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    fcntl: Any = pytest.importorskip("fcntl")
-
+@pytest.mark.parametrize("lacking", ["a writable folder", "locks of the file system"])
+def test_turn__does_not_need(lacking: str, cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def no_locks(*_: object) -> None:
         raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
 
-    monkeypatch.setattr(fcntl, "flock", no_locks)
+    if lacking == "a writable folder":
+        cache.write_text("a file, not a folder")
+    else:
+        monkeypatch.setattr(pytest.importorskip("fcntl"), "flock", no_locks)
     with jit._turn(cache), jit._turn(cache):  # a function and one that it calls
         pass

@@ -24,8 +24,8 @@ from tests.support.moments import Moment, car
 from tests.support.roads import straight
 
 
-def seen(q: Quantities, player: int = 0) -> Mapping[str, float]:
-    return dict(zip(LAYOUT, observe(q)[0, player].tolist(), strict=True))
+def seen(q: Quantities) -> Mapping[str, float]:
+    return dict(zip(LAYOUT, observe(q)[0, 0].tolist(), strict=True))
 
 
 def test_layout__names_every_entry_once() -> None:

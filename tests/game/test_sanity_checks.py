@@ -43,6 +43,12 @@ from tests.support.tiny import MERGE, write_campaign
 STEP = 5  # the step with a fault
 
 
+def error_in(scene: OpenScene) -> str:
+    """The error of a game in which SUMO drives the non-ego."""
+    (game,) = play(arm(scene, Steady(), SumoDriver()), 1)
+    return str(game.record["error"])
+
+
 # --- drivers ----------------------------------------------------------------------------------------------------------
 
 
@@ -191,11 +197,8 @@ def test_motion__a_car_that_the_harness_moves_follows_its_speed_to_a_millimetre(
             state.x_m[0, EGO] += farther_m
 
     monkeypatch.setattr(harness.environments.arena, "move", drive_too_far)
-    (game,) = play(arm(merge, Steady(), SumoDriver()), 1)
-    if faulty:
-        assert re.match(rf"ImpossibleNumber: ego moved [\d.]+ m in step {STEP}, ", game.record["error"])
-    else:
-        assert not game.record["error"]
+    pattern = rf"ImpossibleNumber: ego moved [\d.]+ m in step {STEP}, " if faulty else "$"
+    assert re.match(pattern, error_in(merge))
 
 
 @pytest.mark.parametrize("name", ["x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad"])
@@ -206,8 +209,7 @@ def test_motion__that_is_not_finite_is_named(name: str, merge: OpenScene, monkey
             getattr(state, name)[0, NON_EGO] = np.nan
 
     monkeypatch.setattr("harness.environments.arena.read_sumo_players", lose)
-    (game,) = play(arm(merge, Steady(), SumoDriver()), 1)
-    assert f"the motion of non_ego is not finite in step {STEP}: " in game.record["error"]
+    assert f"the motion of non_ego is not finite in step {STEP}: " in error_in(merge)
 
 
 def test_motion__of_a_background_vehicle_that_is_not_finite_is_an_error_row(
@@ -223,12 +225,9 @@ def test_motion__of_a_background_vehicle_that_is_not_finite_is_an_error_row(
             reading.speed_mps[:] = np.nan
         return reading
 
-    assert not play(arm(scene, Steady(), SumoDriver()), 1)[0].record["error"]
+    assert not error_in(scene)
     monkeypatch.setattr(LibsumoSimulation, "step", lose)
-    (game,) = play(arm(scene, Steady(), SumoDriver()), 1)
-    assert game.record["error"].endswith(
-        f"a background vehicle has no finite position, heading or speed in step {STEP}"
-    )
+    assert error_in(scene).endswith(f"a background vehicle has no finite position, heading or speed in step {STEP}")
 
 
 # --- observations -----------------------------------------------------------------------------------------------------
@@ -246,17 +245,13 @@ def test_observation__out_of_its_bounds_is_an_error_row_with_entry_and_step(
         return view
 
     monkeypatch.setattr(harness.environments.arena, "observe", faulty_observe)
-    (game,) = play(arm(merge, Steady(), SumoDriver()), 1)
-    assert re.match(
-        rf"ImpossibleNumber: non_ego sees goal_m as {np.float32(value)} in step {STEP}, not from -1 to 1$",
-        game.record["error"],
-    )
+    expected = rf"ImpossibleNumber: non_ego sees goal_m as {np.float32(value)} in step {STEP}, not from -1 to 1$"
+    assert re.match(expected, error_in(merge))
 
 
 def test_observation__of_a_reset_is_checked_too(merge: OpenScene, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(harness.environments.arena, "observe", lambda q: observe(q) + np.float32(2.0))
-    (game,) = play(arm(merge, Steady(), SumoDriver()), 1)
-    assert "in step 0, not from -1 to 1" in game.record["error"]
+    assert "in step 0, not from -1 to 1" in error_in(merge)
 
 
 # --- every term can be computed in every scene ------------------------------------------------------------------------

@@ -204,12 +204,8 @@ def test_words__a_person_that_cannot_drive_leaves_both_questions_unanswered():
     arguments["manifest"]["campaign"]["competence"] = {"ego_goal_share": 0.97, "non_ego_goal_share": 0.8}
     text = text_of(arguments).replace("\N{NO-BREAK SPACE}", " ")
     assert "in a share of games: 97 % of an ego, 80 % of a non-ego." in text
-    assert "1 training did not learn to drive this scene." in text
-    stopped = "did not learn: goal in 0 of 60 games alone, at least 80 % asked"
-    assert f"speedy-seed1: {stopped}" in text
-    (stage,) = [row for row in Page(without_curves(arguments)).tables["stages"] if row[0]["text"] == "speedy-seed1"]
-    assert stopped in [cell["text"].replace("\N{NO-BREAK SPACE}", " ") for cell in stage]
-    assert not any("significantly" in sentence for _, sentence in verdict_texts(arguments))
+    assert "speedy-seed1: did not learn: goal in 0 of 60 games alone, at least 80 % asked" in text
+    assert "significantly" not in "".join(sentence for _, sentence in verdict_texts(arguments))
 
 
 def test_numbers__have_a_typographic_form():

@@ -94,13 +94,13 @@ SPEED_MEASURED = """async () => {
 
 @pytest.mark.parametrize("speed", ["0.25", "4"])
 def test_player__speed_is_the_speed_of_the_clock(player, speed):
-    for _ in range(5):  # frames that a busy machine leaves out slow the player down: one undisturbed second is enough
+    def measured():
         page = player("#game=retrained_vs_speedy,1,6&t=0")
         page.locator("[data-is=speed]").select_option(speed)
-        advanced = page.evaluate(SPEED_MEASURED)
-        if advanced == pytest.approx(float(speed), rel=0.35):
-            break
-    assert advanced == pytest.approx(float(speed), rel=0.35)
+        return page.evaluate(SPEED_MEASURED)
+
+    # frames that a busy machine leaves out slow the player down: one undisturbed second is enough
+    assert any(measured() == pytest.approx(float(speed), rel=0.35) for _ in range(5))
 
 
 def test_player__keys_step_one_frame_jump_a_second_and_go_to_the_ends(player, games):

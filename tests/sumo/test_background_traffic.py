@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+from contextlib import closing
 from pathlib import Path
 
 import libsumo
@@ -45,8 +46,7 @@ def test_direct__is_available_on_linux_x86_64() -> None:
 def test_reading__is_what_sumo_has(tmp_path: Path, recorded: bool) -> None:
     """Of all vehicles in a recorded game, else of those near a player; the table of vehicles grows."""
     scene = build_scene(tmp_path, others=OTHERS)
-    simulation = LibsumoSimulation(scene, GAMES, (True, True), 5, recorded=recorded)
-    try:
+    with closing(LibsumoSimulation(scene, GAMES, (True, True), 5, recorded=recorded)) as simulation:
         for game in range(GAMES):
             row = [van(f"v{k}", 20.0 + 20.0 * k) for k in range(7 + 3 * game)]
             late = [van(LONG, 10.0, depart_s=1.5), van("leaves", 290.0)]
@@ -66,24 +66,19 @@ def test_reading__is_what_sumo_has(tmp_path: Path, recorded: bool) -> None:
                     expected = [front_m - 0.5 * VAN_M * np.cos(heading), heading, speed_mps, VAN_M, 2.0]
                     assert found.pop(name) == pytest.approx(expected, abs=1e-9)
             assert all(recorded is False and name[3:] != "leaves" for name in found), "a margin of a vehicle's length"
-    finally:
-        simulation.close()
 
 
 @pytest.mark.usefixtures("way")
 def test_reading__a_vehicle_that_sumo_has_lost_is_an_error(tmp_path: Path) -> None:
     """Read directly, it would end the process."""
     scene = build_scene(tmp_path, others=OTHERS)
-    simulation = LibsumoSimulation(scene, 1, (True, True), 1)
-    try:
+    with closing(LibsumoSimulation(scene, 1, (True, True), 1)) as simulation:
         start = placed(scene, (40, LEFT_Y, 0, 0), None)
         simulation.reset(0, start, [van("first", 60), van("second", 120)])
         simulation.step(start.x_m[None], start.y_m[None], start.heading_rad[None])
         libsumo.vehicle.remove("second")
         with pytest.raises(SimulationError, match="'second' is not known"):
             simulation.step(start.x_m[None], start.y_m[None], start.heading_rad[None])
-    finally:
-        simulation.close()
 
 
 def test_distance__is_that_to_the_nearest_player_that_is_present() -> None:

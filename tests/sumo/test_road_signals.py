@@ -7,6 +7,7 @@ ego is red for 45 s, green for 42 s and yellow for 3 s.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing
 from dataclasses import replace
 
 import libsumo
@@ -39,15 +40,8 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
 @pytest.fixture
 def opened(scene: OpenScene) -> Iterator[Open]:
     """Opens simulations, and closes them."""
-    simulations: list[LibsumoSimulation] = []
-
-    def opened(games: int = 1) -> LibsumoSimulation:
-        simulations.append(LibsumoSimulation(scene, games, (True, True), 1))
-        return simulations[-1]
-
-    yield opened
-    for each in simulations:
-        each.close()
+    with ExitStack() as stack:
+        yield lambda games=1: stack.enter_context(closing(LibsumoSimulation(scene, games, (True, True), 1)))
 
 
 def starting(scene: OpenScene, place: float) -> InitialState:
@@ -132,15 +126,12 @@ def test_reset__a_game_does_not_move_the_lights_of_the_others(scene: OpenScene, 
 
 
 def test_arena__seconds_since_the_change_count_from_it(scene: OpenScene) -> None:
-    arena = Arena(scene, 1, [Seat(None), Seat(None)], seed=1)
-    try:
+    with closing(Arena(scene, 1, [Seat(None), Seat(None)], seed=1)) as arena:
         arena.reset({0: starting(scene, seconds(41.0)[0])})
         columns = [(arena.state.signals.copy(), arena.state.signal_s.copy())]
         for _ in range(60):
             arena.step(np.tile([-1.0, 0.0], (1, 2, 1)))
             columns.append((arena.state.signals.copy(), arena.state.signal_s.copy()))
-    finally:
-        arena.close()
     states, since_s = map(np.array, zip(*columns, strict=True))
     own = column(scene, NON_EGO)
     changed = np.flatnonzero(np.diff(states[:, 0, own]))

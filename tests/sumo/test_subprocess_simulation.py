@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -38,9 +39,8 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
 
 @pytest.fixture
 def far(scene: OpenScene) -> Iterator[SubprocessSimulation]:
-    simulation = SubprocessSimulation(scene, 1, (True, True), 1)
-    yield simulation
-    simulation.close()
+    with closing(SubprocessSimulation(scene, 1, (True, True), 1)) as simulation:
+        yield simulation
 
 
 def ends(process: int, within_s: float = 300.0) -> bool:
@@ -198,8 +198,8 @@ def test_parent__a_script_without_a_main_guard_leaves_no_orphan(scene: OpenScene
 def test_soak__players_off_the_road_near_a_zipper_junction_do_not_crash_sumo(tmp_path: Path) -> None:
     """SUMO 1.28 crashes (SIGSEGV within a thousand steps) if lane changes take time, and with its sublane model."""
     scene = build_scene(tmp_path, ZIPPER_NODES, ZIPPER_EDGES, ZIPPER, goal_m=100.0)
-    simulation, generator = SubprocessSimulation(scene, 4, (True, True), 1), np.random.default_rng(0)
-    try:
+    generator = np.random.default_rng(0)
+    with closing(SubprocessSimulation(scene, 4, (True, True), 1)) as simulation:
         for episode in range(14):
             x, y = generator.uniform(90, 150, (4, 2)), generator.uniform(-9, 0, (4, 2))
             heading, turning = np.zeros((4, 2)), generator.normal(0.0, 0.03, (4, 2))
@@ -209,5 +209,3 @@ def test_soak__players_off_the_road_near_a_zipper_junction_do_not_crash_sumo(tmp
                 heading = heading + turning + generator.normal(0.0, 0.05, (4, 2))
                 x, y = x + 0.6 * np.cos(heading), y + 0.6 * np.sin(heading)
                 simulation.step(x, y, heading)
-    finally:
-        simulation.close()

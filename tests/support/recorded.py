@@ -12,7 +12,7 @@ from harness.evaluation.tables import table_of
 from harness.evaluation.worst_first import worst_first
 from harness.game.arrays import FloatArray
 from harness.replay.selection import choose_games
-from harness.reports.embedding import COLUMNS, GameTracks, Track
+from harness.reports.embedding import GameTracks, Track
 
 STEP_S, STEPS = 0.1, 80
 OUTLINE = [[0, 0], [220, 0], [220, -3.2], [130, -3.2], [100, -6.4], [0, -6.4], [0, 0]]
@@ -39,37 +39,16 @@ def recorded_game(row: Any, background: int = 2) -> GameTracks:
     """One game with the outcome of its row and so many background vehicles."""
     outcome = row.ego_outcome or row.non_ego_outcome
     random = np.random.default_rng([row.seed, row.episode])
-    ends = STEPS - 18 + int(random.integers(10)) if outcome in ("collision", "rail") else STEPS
+    touching = outcome in ("collision", "rail")
+    ends = STEPS - 18 + int(random.integers(10)) if touching else STEPS
     time = np.arange(ends + 1) * STEP_S
-    players = []
-    if row.ego_outcome:
-        players.append(_player("ego", time, 30.0, -1.6, 12.5, random, row.ego_outcome))
-    if row.non_ego_outcome:
-        players.append(_player("non_ego", time, 32.0, -4.8, 13.4, random, row.non_ego_outcome))
-    if outcome == "collision" and len(players) == 2:
-        ego, non_ego = (player.columns for player in players)
-        shift = ego["y_m"][-1] - non_ego["y_m"][-1] - 1.75
-        non_ego["y_m"][:] += shift * np.clip((time - time[-1] + 2.5) / 2.5, 0, 1) ** 2
-        non_ego["x_m"][:] += (ego["x_m"][-1] - non_ego["x_m"][-1] + 1.2) * (time / time[-1])
-    touches = []
-    if outcome in ("collision", "rail"):
-        first = players[0].columns
-        y_m = first["y_m"][-1] - 0.9 if outcome == "collision" else 0.0
-        touches.append((float(time[-1]), float(first["x_m"][-1]), float(y_m)))
+    sides = {"ego": (row.ego_outcome, 12.5), "non_ego": (row.non_ego_outcome, 13.4 if touching else 14.4)}
+    players = [_player(name, time, random, *each) for name, each in sides.items() if each[0]]
     along = [
-        Track(
-            name=f"car {n}",
-            size_m=(5.0, 1.8),
-            first_step=0,
-            columns={
-                "x_m": 80 + 30 * n + 9.0 * time,
-                "y_m": np.full(len(time), -1.6),
-                "heading_rad": 0 * time,
-                "speed_mps": 0 * time + 9.0,
-            },
-        )
+        Track(name=f"car {n}", size_m=(5.0, 1.8), first_step=0, columns=_motion(time, 80.0 + 30.0 * n, -1.6, 9.0))
         for n in range(background)
     ]
+    y_m = {"collision": -2.5, "rail": 0.0}
     return GameTracks(
         arm=row.arm,
         persona=row.persona,
@@ -80,45 +59,36 @@ def recorded_game(row: Any, background: int = 2) -> GameTracks:
         outcome=outcome,
         players=players,
         background=along,
-        touches=touches,
+        touches=[(float(time[-1]), float(players[0].columns["x_m"][-1]), y_m[outcome])] if touching else [],
     )
 
 
-def _player(
-    name: str,
-    time: FloatArray,
-    x_m: float,
-    y_m: float,
-    speed_mps: float,
-    random: np.random.Generator,
-    outcome: str,
-) -> Track:
+def _player(name: str, time: FloatArray, random: np.random.Generator, outcome: str, speed_mps: float) -> Track:
+    """The ego keeps its lane; the person changes to it where its own ends."""
     ego = name == "ego"
-    wave = random.uniform(0.6, 1.4)
-    acceleration = (-0.6 if ego else 0.5) * np.sin(wave * time) + random.normal(0, 0.08, len(time))
-    if ego:
-        acceleration = np.where(time > time[-1] - 1.2, -4.0, acceleration)
-    speed = np.maximum(speed_mps + np.cumsum(acceleration) * STEP_S, 0.0)
-    x = x_m + np.concatenate(([0.0], np.cumsum(speed)[:-1] * STEP_S))
-    y: FloatArray = np.full(len(time), y_m)
+    acceleration = random.normal(-0.1 if ego else 0.1, 0.08, len(time))
+    x_m, y_m = (30.0, -1.6) if ego else (32.0, -4.8)
+    columns = _motion(time, x_m, y_m, speed_mps + np.cumsum(acceleration) * STEP_S) | {
+        "acceleration_mps2": acceleration,
+        "steering_rad": np.zeros(len(time)),
+        "lapsed": ((time > 2.0) & (time < 3.4) & (not ego)).astype(float),
+        "leader_gap_m": np.where(np.abs(time - 3.5) < 2.5, 18 - 2.2 * time, np.inf),
+        "time_to_collision_s": np.where(time > 2.5, (time[-1] - time) * 1.3, np.inf),
+    }
     if not ego:
-        y = y_m + 3.2 * np.clip((x - 85) / 40, 0, 1) ** 2
-    elif outcome == "rail":
-        y = y_m + 0.75 * np.clip((time - time[-1] + 2.0) / 2.0, 0, 1) ** 2
-    heading = np.arctan2(np.gradient(y), np.gradient(x))
-    gap = np.where(np.abs(time - 3.5) < 2.5, 18 - 2.2 * time, np.inf)
-    time_to_collision = np.where(time > 2.5, np.maximum(time[-1] - time, 0.0) * 1.3, np.inf)
-    steering = np.gradient(heading) * 2.0
-    lapsed = ((time > 2.0) & (time < 3.4) & (not ego)).astype(float)
-    values = (x, y, heading, speed, acceleration, steering, lapsed, gap, time_to_collision)
-    return Track(
-        name=name,
-        size_m=(4.6, 1.8),
-        first_step=0,
-        columns=dict(zip(COLUMNS, values, strict=True)),
-        outcome=outcome,
-        ended_step=len(time) - 1,
-    )
+        columns["y_m"] += 3.2 * np.clip((columns["x_m"] - 85) / 40, 0, 1) ** 2
+    return Track(name=name, size_m=(4.6, 1.8), first_step=0, columns=columns, outcome=outcome, ended_step=len(time) - 1)
+
+
+def _motion(time: FloatArray, x_m: float, y_m: float, speed_mps: FloatArray | float) -> dict[str, FloatArray]:
+    """A car that drives along the road from a place."""
+    speed = np.zeros(len(time)) + speed_mps
+    return {
+        "x_m": x_m + np.cumsum(speed) * STEP_S,
+        "y_m": np.full(len(time), y_m),
+        "heading_rad": np.zeros(len(time)),
+        "speed_mps": speed,
+    }
 
 
 def manoeuvres(episodes: pd.DataFrame) -> pd.DataFrame:
