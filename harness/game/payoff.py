@@ -55,21 +55,17 @@ class FuzzyFunction:
     def __call__(self, value: FloatArray) -> FloatArray:
         """[...] values of the function: 0 where the input belongs to no set, NaN where the input is NaN."""
         value = np.asarray(value, dtype=float)
-        return _infer(value.ravel(), *self._points, self._values).reshape(value.shape)
+        return _infer(value.ravel(), *self._points).reshape(value.shape)
 
     @cached_property
-    def _points(self) -> tuple[FloatArray, FloatArray]:
-        """[S, N] inputs and memberships of the sets' points; a set with fewer points repeats its last point."""
+    def _points(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """[S, N] inputs and memberships of the sets' points, the last one repeated, and [S] the sets' values."""
         most = max(len(each.inputs) for each in self.sets)
         inputs, memberships = (
             [[*points, *[points[-1]] * (most - len(points))] for points in columns]
             for columns in zip(*((each.inputs, each.memberships) for each in self.sets), strict=True)
         )
-        return np.array(inputs), np.array(memberships)
-
-    @cached_property
-    def _values(self) -> FloatArray:
-        return np.array([each.value for each in self.sets])
+        return np.array(inputs), np.array(memberships), np.array([each.value for each in self.sets])
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import partial
 from math import nan
@@ -73,6 +73,11 @@ def _ends(group: str, meaning: str, form: Form, outcome: Outcome) -> Term:
     )
 
 
+def _below(meaning: str, quantity: str, parameter: str, *, per_second: bool = True) -> Term:
+    limited = Term(group="safety", meaning=meaning, quantity=quantity, form=Form.BELOW, parameter=parameter)
+    return replace(limited, per_second=per_second)
+
+
 _safety = partial(Term, group="safety")
 _operational = partial(Term, group="operational")
 _human = partial(Term, group="human")
@@ -80,24 +85,10 @@ _human = partial(Term, group="human")
 TERMS: Mapping[str, Term] = {
     "collision": _ends("safety", "touching a vehicle or person", Form.LOST, Outcome.COLLISION),
     "rail": _ends("safety", "touching the edge of the road", Form.LOST, Outcome.RAIL),
-    "clearance": _safety(
-        meaning="nearness to the nearest surface, rail or vehicle",
-        quantity="clearance_m",
-        form=Form.BELOW,
-        parameter="within_m",
-    ),
-    "vehicle_clearance": _safety(
-        meaning="nearness to the nearest vehicle", quantity="vehicle_clearance_m", form=Form.BELOW, parameter="within_m"
-    ),
-    "time_gap": _safety(
-        meaning="following closer than a time gap", quantity="time_gap_s", form=Form.BELOW, parameter="within_s"
-    ),
-    "time_to_collision": _safety(
-        meaning="being on a course to contact sooner than this",
-        quantity="time_to_collision_s",
-        form=Form.BELOW,
-        parameter="within_s",
-    ),
+    "clearance": _below("nearness to the nearest surface, rail or vehicle", "clearance_m", "within_m"),
+    "vehicle_clearance": _below("nearness to the nearest vehicle", "vehicle_clearance_m", "within_m"),
+    "time_gap": _below("following closer than a time gap", "time_gap_s", "within_s"),
+    "time_to_collision": _below("being on a course to contact sooner than this", "time_to_collision_s", "within_s"),
     "speed_over_limit": _safety(
         meaning="speed over the limit, or over what a signal, a sign or priority permits, as a share of the limit",
         quantity="speed_over_permitted",
@@ -124,19 +115,13 @@ TERMS: Mapping[str, Term] = {
         form=Form.LESS,
         example=("on the wrong side", 1.0),
     ),
-    "yield": _safety(
-        meaning="entering the way of a vehicle with priority that is there sooner than this, once",
-        quantity="entered_before_s",
-        form=Form.BELOW,
+    "yield": _below(
+        "entering the way of a vehicle with priority that is there sooner than this, once",
+        "entered_before_s",
+        "within_s",
         per_second=False,
-        parameter="within_s",
     ),
-    "gap": _safety(
-        meaning="passing a crossing or a merge closer in time to another vehicle than this",
-        quantity="gap_s",
-        form=Form.BELOW,
-        parameter="within_s",
-    ),
+    "gap": _below("passing a crossing or a merge closer in time to another vehicle than this", "gap_s", "within_s"),
     "goal": _ends("operational", "reaching the goal", Form.GAINED, Outcome.GOAL),
     "timeout": _ends("operational", "not reaching the goal in time", Form.LOST, Outcome.TIMEOUT),
     "progress": _operational(

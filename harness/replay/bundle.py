@@ -76,7 +76,8 @@ def write_replay(
         )
         moments = [*(contact.time_s for contact in touches), float(trace["time_s"].max())]
         halts_s = sorted({shown_at(moment, step_length_s) for moment in moments})
-        write_xml(view_settings(view, halts_s, lanes, signals=_has_signals(trace)), partial / "view.xml")
+        signals = "signals" in trace and bool((trace["signals"] != "").any())
+        write_xml(view_settings(view, halts_s, lanes, signals=signals), partial / "view.xml")
         # Without an end SUMO would never stop. At the end SUMO-GUI asks a question in front of the picture; the end is
         # a step beyond the last halt, so that the picture stays free until the user presses the play button.
         write_xml(_configuration(title, halts_s[-1] + 2 * step_length_s, step_length_s), partial / "scene.sumocfg")
@@ -113,7 +114,3 @@ def _configuration(title: str, end_s: float, step_length_s: float) -> ElementTre
         for option, value in options.items():
             ElementTree.SubElement(parent, option, value=value)
     return root
-
-
-def _has_signals(trace: pd.DataFrame) -> bool:
-    return "signals" in trace and bool((trace["signals"] != "").any())

@@ -6,7 +6,6 @@ import base64
 import json
 import math
 import zlib
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import pandas as pd
@@ -37,20 +36,15 @@ def table(name: str, caption: str, frame: pd.DataFrame) -> dict[str, Any]:
     frame, about = typed(frame), columns_of(frame.columns)
     shown = {"name": name, "caption": caption, "headings": list(map(_heading, about.values())), "length": len(frame)}
     if name in PACKED:
-        packed = _pack([[exact(value) for value in frame[column].tolist()] for column in about])
-        return {**shown, "rows": (), "packed": packed}
+        texts = json.dumps([list(map(exact, frame[column].tolist())) for column in about], separators=(",", ":"))
+        packed = base64.b64encode(zlib.compress(texts.encode(), 9)).decode("ascii")
+        return {**shown, "rows": (), "packed": Markup(packed)}
     metrics = frame["metric"].tolist() if "metric" in frame.columns else [""] * len(frame)
     columns = [
         [_cell(column, value, metric) for value, metric in zip(frame[name].tolist(), metrics, strict=True)]
         for name, column in about.items()
     ]
     return {**shown, "rows": list(zip(*columns, strict=True)), "packed": None}
-
-
-def _pack(columns: Sequence[Sequence[str]]) -> Markup:
-    """Columns of texts as one text of a script element."""
-    text = json.dumps(columns, separators=(",", ":"))
-    return Markup(base64.b64encode(zlib.compress(text.encode(), 9)).decode("ascii"))
 
 
 def _heading(column: Column) -> dict[str, Any]:

@@ -130,10 +130,9 @@ def portrait(document: Mapping[str, Any]) -> str:
 def card_verdict(question: str, answer: Answer, figures: Sequence[KeyFigure]) -> dict[str, Any]:
     """An answer with its question in plain words, as a persona's card shows it: an ego that fails less is mended only
     partly where a key figure warns. `caution` is what the answer does not say; empty if nothing."""
-    label, tone = answer.label[:1].upper() + answer.label[1:], answer.tone
+    label, tone, caution = answer.label[:1].upper() + answer.label[1:], answer.tone, ""
     warnings = [each for each in figures if each.warns]
     if tone == "mended" and warnings:
         label, tone = PARTLY, "open"
         caution = " ".join(f"But {each.title.lower()}: {each.lines[-1]}." for each in warnings)
-        return {"question": question, "answer": answer, "label": label, "tone": tone, "caution": caution}
-    return {"question": question, "answer": answer, "label": label, "tone": tone, "caution": ""}
+    return {"question": question, "answer": answer, "label": label, "tone": tone, "caution": caution}

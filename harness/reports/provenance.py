@@ -8,6 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 from harness.reports.numbers import percent, steps_text
 
+if TYPE_CHECKING:
+    from rich.console import Console
+
+MIXED_VERSIONS = "This run mixes versions: its results may differ from those of a single version."
+THEN = ", then "
+
 
 def facts(manifest: Mapping[str, Any], seeds: Sequence[int], personas: int) -> list[tuple[str, str]]:
     """The facts below the page's title, as label and value. `personas` is their number."""
@@ -46,13 +52,6 @@ def rounds(stages: Iterable[Mapping[str, Any]]) -> str:
     if any(stage.get("kind") == "reconfiguration" for stage in stages):
         return "0, 1 and 2: this ego is not trained, but its parameters are tuned"
     return "0 and 1: this ego has nothing to train or to tune"
-
-
-if TYPE_CHECKING:
-    from rich.console import Console
-
-MIXED_VERSIONS = "This run mixes versions: its results may differ from those of a single version."
-THEN = ", then "
 
 
 def asked_alone(manifest: Mapping[str, Any]) -> str:

@@ -46,7 +46,6 @@ _ANY_EDGE, _ANY_LANE = repeat(""), repeat(-1)
 _NO_ACTIONS_S = 1e6  # an action step longer than any game: disables SUMO's driver model for a car
 _LATERAL_RESOLUTION_M = 0.8  # as in SUMO's documentation of the sublane model: a quarter of a lane
 _ANY_SPEED = 100.0  # a speed factor: other vehicles see at most the speed limit times this
-_FAILURES = (libsumo.TraCIException, libsumo.FatalTraCIError)
 
 
 class LibsumoSimulation(Simulation):

@@ -95,7 +95,7 @@ class SubprocessSimulation(Simulation):
         assert self._child.stdout is not None
         try:
             _send(self._child.stdin, message)
-            answer, refusal = _receive(self._child.stdout)
+            answer, refusal = pickle.load(self._child.stdout)
         except (EOFError, OSError, pickle.UnpicklingError):
             raise SimulationError(f"SUMO's process {_ending_of(self._child)}") from None
         except BaseException:
@@ -149,11 +149,6 @@ def _send(stream: IO[bytes], message: Any) -> None:
     stream.flush()
 
 
-def _receive(stream: IO[bytes]) -> Any:
-    """The next message. Raises EOFError at the end of the stream, UnpicklingError if it ends within a message."""
-    return pickle.load(stream)
-
-
 # --- in the child -----------------------------------------------------------------------------------------------------
 
 
@@ -168,7 +163,7 @@ def serve() -> None:
     # the parent has closed this simulation, or has ended
     with contextlib.suppress(EOFError, BrokenPipeError, pickle.UnpicklingError):
         while True:
-            first, *arguments = _receive(incoming)
+            first, *arguments = pickle.load(incoming)
             result, refusal = None, None
             try:
                 if simulation is None:

@@ -67,7 +67,7 @@ def read_run(folder: RunFolder, console: Console) -> ReadRun:
     training = joined("training", _gathered(folder, manifest, "training", "training.csv"))
     searches = joined("reconfiguration", _gathered(folder, manifest, "reconfiguration", "reconfiguration.csv"))
     policies = {stage: _policy(folder.policy(stage)) for stage in _done(manifest, "training")}
-    reference_drivers = _reference_drivers(folder, manifest)
+    judged = list(_gathered(folder, manifest, "preventability", JUDGED))
     with doing(console, "measuring the games"):
         arms = [arm_tables(folder, stage, scene) for stage in _done(manifest, "assessment")]
     return ReadRun(
@@ -81,7 +81,7 @@ def read_run(folder: RunFolder, console: Console) -> ReadRun:
         manoeuvres=joined("manoeuvres", [arm.manoeuvres for arm in arms]),
         training=training,
         reconfiguration=searches,
-        reference_drivers=reference_drivers,
+        reference_drivers=joined("reference_drivers", judged) if judged else None,
     )
 
 
@@ -113,19 +113,11 @@ def _gathered(folder: RunFolder, manifest: Mapping[str, Any], kind: str, table: 
     for stage in _done(manifest, kind):
         file = folder.work(stage) / table
         frame = read_csv(file)
-        _check_rows(file, manifest["stages"][stage], frame["stage"], frame["seed"])
+        names = frame["arm"] + "_preventability" if kind == "preventability" else frame["stage"]
+        _check_rows(file, manifest["stages"][stage], names, frame["seed"])
         if kind == "reconfiguration" and not is_of_a_search(frame):
             raise UsageError.of(file, "", "has rows of no search", "run the campaign again")
         yield frame
-
-
-def _reference_drivers(folder: RunFolder, manifest: Mapping[str, Any]) -> pd.DataFrame | None:
-    stages = _done(manifest, "preventability")
-    frames = [read_csv(folder.work(stage) / JUDGED) for stage in stages]
-    for stage, frame in zip(stages, frames, strict=True):
-        names = frame["arm"] + "_preventability"
-        _check_rows(folder.work(stage) / JUDGED, manifest["stages"][stage], names, frame["seed"])
-    return joined("reference_drivers", frames) if stages else None
 
 
 def _check_rows(file: Path, entry: Mapping[str, Any], names: pd.Series, seeds: pd.Series) -> None:

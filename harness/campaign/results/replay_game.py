@@ -48,41 +48,25 @@ class GameList:
     page: int = 1
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Page:
-    games: pd.DataFrame
-    """Of episodes.csv: arm, seed, episode, an outcome per player, ego_min_ttc_s and severity; and the cause of a
-    failure in words."""
-    players: tuple[str, ...]
-    number: int
-    """Of the games on all pages."""
-    pages: int
-
-
-def _listed(run: Path, chosen: GameList) -> _Page:
-    """The chosen games of a run. Raises UsageError where no game is of an arm, a seed or an outcome."""
+def _listed(run: Path, chosen: GameList) -> tuple[pd.DataFrame, int, int]:
+    """A page of the chosen games of a run, worst first, with the causes of failures in words; the number of games on
+    all pages, and of pages. Raises UsageError where no game is of an arm, a seed or an outcome."""
     folder = RunFolder(run)
-    episodes = episodes_of(folder)
+    ordered = worst_first(_chosen(run, episodes_of(folder), chosen))
     causes = causes_in_words(read_csv(folder.path / "causes.csv"))
-    episodes = _chosen(run, episodes, chosen)
-    ordered = worst_first(episodes)
     rows = chosen.rows or max(len(ordered), 1)
     games = ordered.iloc[(chosen.page - 1) * rows : chosen.page * rows]
-    players = ("ego", *people_in(episodes.columns))
-    columns = ["arm", "seed", "episode", *(f"{name}_outcome" for name in players), "ego_min_ttc_s", "severity"]
+    outcomes = [f"{name}_outcome" for name in ("ego", *people_in(games.columns))]
     found = [causes.get((game.arm, game.seed, game.episode), "") for game in games.itertuples()]
-    return _Page(
-        games=games[columns].assign(cause=found),
-        players=players,
-        number=len(ordered),
-        pages=max(-(-len(ordered) // rows), 1),
-    )
+    games = games[["arm", "seed", "episode", *outcomes, "ego_min_ttc_s", "severity"]].assign(cause=found)
+    return games, len(ordered), max(-(-len(ordered) // rows), 1)
 
 
 def game_table(run: Path, chosen: GameList) -> Table:
     """The chosen games of a run, for the terminal."""
-    listed = _listed(run, chosen)
-    left = f"page {chosen.page} of {listed.pages}, {listed.number:,} games; {_OTHERS}; " if listed.pages > 1 else ""
+    games, number, pages = _listed(run, chosen)
+    players = ("ego", *people_in(games.columns))
+    left = f"page {chosen.page} of {pages}, {number:,} games; {_OTHERS}; " if pages > 1 else ""
     table = Table(
         title=Text(f"Games of {run}, worst first"),
         title_justify="left",
@@ -90,13 +74,13 @@ def game_table(run: Path, chosen: GameList) -> Table:
         box=SIMPLE,
         padding=0,
     )
-    for name in ("arm", "seed", "episode", *listed.players, "cause", "TTC (s)", "severity"):
+    for name in ("arm", "seed", "episode", *players, "cause", "TTC (s)", "severity"):
         heading = name.replace("non_ego", "non-ego").replace("_", " ")
-        table.add_column(heading, overflow="fold", no_wrap=name in ("arm", *listed.players))
-    for game in listed.games.itertuples():
+        table.add_column(heading, overflow="fold", no_wrap=name in ("arm", *players))
+    for game in games.itertuples():
         ttc = "" if pd.isna(game.ego_min_ttc_s) else f"{game.ego_min_ttc_s:.1f}"
         severity = "" if math.isinf(game.severity) else f"{game.severity:.1f}"
-        outcomes = [getattr(game, f"{name}_outcome") for name in listed.players]
+        outcomes = [getattr(game, f"{name}_outcome") for name in players]
         words = (game.arm, str(game.seed), str(game.episode), *outcomes, game.cause, ttc, severity)
         table.add_row(*(Text(plain(cell)) for cell in words))  # text without markup, whatever the table contains
     return table
@@ -104,9 +88,9 @@ def game_table(run: Path, chosen: GameList) -> Table:
 
 def game_records(run: Path, chosen: GameList) -> dict[str, Any]:
     """The chosen games of a run, for JSON: a number that is not known is None."""
-    listed = _listed(run, chosen)
-    known = listed.games.astype(object).where(listed.games.notna() & ~listed.games.isin([math.inf, -math.inf]), None)
-    shown = {"page": chosen.page, "pages": listed.pages, "number": listed.number}
+    games, number, pages = _listed(run, chosen)
+    known = games.astype(object).where(games.notna() & ~games.isin([math.inf, -math.inf]), None)
+    shown = {"page": chosen.page, "pages": pages, "number": number}
     return {"run": str(run), **shown, "games": known.to_dict("records")}
 
 
