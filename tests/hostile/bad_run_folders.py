@@ -10,6 +10,8 @@ import json
 import os
 import pickle
 from collections.abc import Callable
+from functools import reduce
+from operator import delitem, getitem, setitem
 from pathlib import Path
 from typing import Any
 
@@ -40,26 +42,19 @@ def manifest(change: Callable[[dict[str, Any]], object]) -> Spoil:
     return spoil
 
 
+def around(document: dict[str, Any], keys: tuple[str, ...]) -> dict[str, Any]:
+    """The table of a manifest that holds the last of these keys."""
+    return reduce(getitem, keys[:-1], document)
+
+
 def holding(*keys: str, value: object) -> Spoil:
     """A manifest with another value at a place."""
-
-    def change(document: dict[str, Any]) -> None:
-        for key in keys[:-1]:
-            document = document[key]
-        document[keys[-1]] = value
-
-    return manifest(change)
+    return manifest(lambda document: setitem(around(document, keys), keys[-1], value))
 
 
 def lacking(*keys: str) -> Spoil:
     """A manifest without a key."""
-
-    def change(document: dict[str, Any]) -> None:
-        for key in keys[:-1]:
-            document = document[key]
-        del document[keys[-1]]
-
-    return manifest(change)
+    return manifest(lambda document: delitem(around(document, keys), keys[-1]))
 
 
 def sealed(spoil: Spoil) -> Spoil:

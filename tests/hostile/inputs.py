@@ -123,30 +123,26 @@ def put(file: str, content: bytes | str) -> Spoil:
     return lambda project: (project / file).write_bytes(content.encode() if isinstance(content, str) else content)
 
 
+def rewritten(file: str, change: Callable[[bytes], bytes]) -> Spoil:
+    """What a change makes of the file's bytes."""
+    return lambda project: (project / file).write_bytes(change((project / file).read_bytes()))
+
+
 def recode(file: str, encoding: str) -> Spoil:
     """The same text in another encoding."""
-    return lambda project: (project / file).write_bytes((project / file).read_text("utf-8").encode(encoding))
+    return rewritten(file, lambda before: before.decode("utf-8").encode(encoding))
 
 
 def inserted(file: str, content: bytes, share: float = 0.5) -> Spoil:
     """Bytes in the middle of the file."""
-
-    def spoil(project: Path) -> None:
-        before = (project / file).read_bytes()
-        place = int(len(before) * share)
-        (project / file).write_bytes(before[:place] + content + before[place:])
-
-    return spoil
+    return rewritten(
+        file, lambda before: before[: int(len(before) * share)] + content + before[int(len(before) * share) :]
+    )
 
 
 def cut(file: str, share: float) -> Spoil:
     """The first part of the file alone."""
-
-    def spoil(project: Path) -> None:
-        before = (project / file).read_bytes()
-        (project / file).write_bytes(before[: int(len(before) * share)])
-
-    return spoil
+    return rewritten(file, lambda before: before[: int(len(before) * share)])
 
 
 def instead(file: str, make: Callable[[Path], object]) -> Spoil:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import os
 import pickle
-import subprocess
 from collections.abc import Iterator
 from functools import cache
 from html.parser import HTMLParser
@@ -105,15 +104,11 @@ def test_bomb__goes_off_when_it_is_unpickled(tmp_path: Path) -> None:
     assert (tmp_path / "mark").is_dir()
 
 
-def _run(folder: Path, *command: object) -> subprocess.CompletedProcess[str]:
-    return harness(*command, cwd=folder)
-
-
 @pytest.mark.parametrize("file", [TENSORS, CARD])
 def test_policy__that_is_a_pickle_does_not_go_off(file: str, tmp_path: Path) -> None:
     project = write_project(tmp_path)
     (project / file).write_bytes(pickle.dumps(_Bomb(tmp_path / "mark")))
-    assert _run(tmp_path, CHECK[0], project / CHECK[1]).returncode == 2
+    assert harness(CHECK[0], project / CHECK[1], cwd=tmp_path).returncode == 2
     assert not (tmp_path / "mark").exists()
 
 
@@ -126,9 +121,9 @@ def test_run_folder__none_of_its_files_goes_off(tmp_path: Path) -> None:
         if file.name != "manifest.json":
             file.write_bytes(bomb)
     for command in (("report", run), ("replay", run, "--list"), ("replay", run, "naive_alone", "0")):
-        assert _run(tmp_path, *command).returncode == 2
+        assert harness(*command, cwd=tmp_path).returncode == 2
     (run / "manifest.json").write_bytes(bomb)
-    assert _run(tmp_path, "report", run).returncode == 2
+    assert harness("report", run, cwd=tmp_path).returncode == 2
     assert not (tmp_path / "mark").exists()
 
 
@@ -138,7 +133,7 @@ def test_folder__programs_that_lie_beside_documents_are_not_run(tmp_path: Path) 
     for folder in (tmp_path, project, *(each for each in project.rglob("*") if each.is_dir())):
         for name in ("sitecustomize", "usercustomize", "conftest", "numpy", "json", "libsumo", "harness", "tomllib"):
             (folder / f"{name}.py").write_text(program)
-    done = _run(project / "campaigns", CHECK[0], project / CHECK[1])
+    done = harness(CHECK[0], project / CHECK[1], cwd=project / "campaigns")
     assert done.returncode == 0, done.stderr
     assert not (tmp_path / "mark").exists()
 

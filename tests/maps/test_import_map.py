@@ -120,9 +120,11 @@ def test_import__a_name_with_commas_and_blanks_is_one_name(tmp_path: Path) -> No
     assert import_map(odd, tmp_path, left_hand=False)[1].hasEdge("-1")
 
 
-def test_import__500_mb_of_a_net_are_refused_by_their_size(tmp_path: Path) -> None:
-    large = tmp_path / "country.net.xml"
-    with large.open("wb") as sparse:
+@pytest.mark.parametrize(
+    ("name", "remedy"), [("country.net.xml", r"keep-edges\.in-boundary"), ("country.osm", "100 MB.*osmium extract")]
+)
+def test_import__500_mb_are_refused_by_their_size(name: str, remedy: str, tmp_path: Path) -> None:
+    with (tmp_path / name).open("wb") as sparse:
         sparse.truncate(500_000_000)
-    with pytest.raises(UsageError, match=r"too large: 500 MB.*keep-edges\.in-boundary"):
-        import_map(large, tmp_path, left_hand=False)
+    with pytest.raises(UsageError, match=rf"too large: 500 MB.*{remedy}"):
+        import_map(tmp_path / name, tmp_path, left_hand=False)

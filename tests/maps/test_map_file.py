@@ -100,14 +100,6 @@ def test_facts__of_a_file_that_is_no_map_of_roads(content: str, message: str, tm
         facts_of(file, MapKind.OSM)
 
 
-def test_facts__500_mb_are_refused_by_their_size_before_they_are_read(tmp_path: Path) -> None:
-    file = tmp_path / "country.osm"
-    with file.open("wb") as sparse:
-        sparse.truncate(500_000_000)
-    with pytest.raises(UsageError, match=r"too large: 500 MB, at most 100 MB.*osmium extract"):
-        facts_of(file, MapKind.OSM)
-
-
 def test_facts__of_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="there is no such file"):
         facts_of(tmp_path / "no.osm", MapKind.OSM)
