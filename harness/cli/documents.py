@@ -32,7 +32,7 @@ def new_persona(
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="The file.  [default: personas/NAME.toml]")] = None,
 ) -> None:
     """Write a commented template of a persona: a valid document with every key. No file is overwritten."""
-    from harness.cli.persona_template import create_persona
+    from harness.cli.new_documents import create_persona
 
     file = create_persona(name, out)
     show, check = f"harness persona show {file}", f"harness persona check {file}"
@@ -42,10 +42,10 @@ def new_persona(
 @persona_app.command("check")
 def check_persona(file: PersonaFile) -> None:
     """Check a persona: its document, and that its sources are evidence and not the text of the template."""
-    from harness.cli import persona_template
+    from harness.cli import new_documents
 
     file = document_at(file, "personas")
-    persona = persona_template.check_persona(file)
+    persona = new_documents.check_persona(file)
     sources = f"{len(persona.sources)} source{'' if len(persona.sources) == 1 else 's'}"
     print(f"{file} is in order: {persona.name}, {sources}. To see what it means: harness persona show {file}")
 
@@ -79,7 +79,7 @@ def new(folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="The new f
     """Make a project: a campaign, a scene and a persona of your own, which run as they are, and a README."""
     from rich.console import Console
 
-    from harness.cli.project import create_project
+    from harness.cli.new_documents import create_project
 
     written = [f"wrote {file}" for file in create_project(folder)]
     print_plain([*written, f"Next: cd {folder} && harness campaign campaign.toml --quick"], Console())

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import errno
+import json
 import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from errno import EACCES, EDQUOT, EFBIG, EIO, EMFILE, ENOMEM, ENOSPC, EPERM, EROFS
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
@@ -15,8 +16,17 @@ import typer
 
 from harness.cli import messages
 from harness.cli.documents import check, check_driver, columns, new, persona_app, policy_app, schema
-from harness.cli.ending import end_with
-from harness.cli.output import AllowCode, AsJson, Quiet, RunPath, Verbose, output, print_plain, print_version
+from harness.cli.output import (
+    AllowCode,
+    AsJson,
+    Quiet,
+    RunPath,
+    Verbose,
+    output,
+    print_json,
+    print_plain,
+    print_version,
+)
 from harness.cli.pinning import minimise, regression
 from harness.cli.runs import compare, export, replay, serve
 from harness.cli.scenes import scene_app
@@ -24,22 +34,17 @@ from harness.errors import FAILED, NOT_ACCEPTED, USAGE_ERROR
 from harness.shipped_documents import document_at
 
 if TYPE_CHECKING:
-    from harness.campaign.execution.run_stages import StartWorkers
+    from rich.console import Console
 
-MACHINE_ERRORS = (
-    errno.ENOSPC,
-    errno.EDQUOT,
-    errno.EACCES,
-    errno.EPERM,
-    errno.EROFS,
-    errno.EMFILE,
-    errno.ENOMEM,
-    errno.EFBIG,
-    errno.EIO,
-)
+    from harness.campaign.execution.run_stages import StartWorkers
+    from harness.campaign.results.kept_results import RunResult
+
+MACHINE_ERRORS = (ENOSPC, EDQUOT, EACCES, EPERM, EROFS, EMFILE, ENOMEM, EFBIG, EIO)
 """Errors of the operating system that are no mistakes of the program: they are reported without a traceback."""
 INTERRUPTED = 130
 """The exit code after Ctrl-C: 128 plus the number of SIGINT."""
+
+_STYLES = {"harm": "bold red", "mended": "bold green", "open": "bold yellow"}
 
 app = typer.Typer(
     name="harness",
@@ -138,7 +143,7 @@ def campaign(
         except KeyboardInterrupt as interrupt:
             console.print(messages.INTERRUPTED)
             raise typer.Exit(*(interrupt.args or [INTERRUPTED])) from None
-        end_with(outcome, folder.path, console, as_json)
+        _end_with(outcome, folder.path, console, as_json)
 
 
 @app.command()
@@ -167,7 +172,7 @@ def report(run: RunPath, as_json: AsJson = False, quiet: Quiet = False, verbose:
         folder.manifest()
         with folder.held():
             outcome = write_results(folder, console)
-        end_with(outcome, run, console, as_json)
+        _end_with(outcome, run, console, as_json)
 
 
 for command in (replay, export, serve, compare, new, check, check_driver, minimise, regression, schema, columns):
@@ -191,6 +196,40 @@ def _started_on(ray: str | None, jobs: int | None, warn: Callable[[str], None]) 
 
     with ray_cluster(ray, jobs) as cluster:
         yield partial(RayWorkers, ray=cluster, jobs=jobs, warn=warn)
+
+
+def _end_with(outcome: RunResult, run: Path, console: Console, as_json: bool = False) -> None:
+    """Say what has come out, and end the command with the exit code of the run.
+
+    What failed is said also where the console is quiet. As JSON: the content of `result.json`, the run folder and the
+    report.
+    """
+    did_not_learn = [f"Did not learn: {training}" for training in outcome.did_not_learn]
+    print_plain(did_not_learn, console, "bold yellow")
+    for verdict in outcome.verdicts:
+        label = f"{verdict.persona}, {verdict.question}: {verdict.label}"
+        console.print(label, style=_STYLES[verdict.tone], highlight=False, markup=False)
+        for sentence in filter(None, (verdict.sentence, *verdict.causes, verdict.speed)):
+            console.print(f"  {sentence}", highlight=False, markup=False)
+    for bound in outcome.acceptance:
+        print_plain([bound.text], console, "green" if bound.passed else "bold red")
+    print_plain([f"Report: {run / 'report.html'}"], console)
+    if as_json:
+        from harness.campaign.results.ci_files import RESULT
+
+        result = json.loads((run / RESULT).read_text(encoding="utf-8"))
+        print_json({"run": str(run), "report": str(run / "report.html"), **result})
+    if console.quiet:
+        console.quiet = False
+        print_plain(did_not_learn, console)
+        print_plain((bound.text for bound in outcome.acceptance if not bound.passed), console)
+    if outcome.failed_stages:
+        print_plain([f"Not finished: {', '.join(outcome.failed_stages)}"], console, "red")
+    if outcome.error_games:
+        count = f"{outcome.error_games} games could not be played; their pairs are left out"
+        print_plain([count, *(f"  {each}" for each in outcome.error_reasons)], console, "red")
+    if outcome.exit_code:
+        raise typer.Exit(outcome.exit_code)
 
 
 def _handle_termination_signals() -> None:

@@ -85,9 +85,7 @@ class Fmu(Adjustable, WithFiles):
     kind: Literal["fmu"] = KIND
     file: DocumentPath
     """The FMU, relative to this document's folder."""
-    inputs: dict[VariableName, Annotated[str, one_of(LAYOUT, "the observation has no entry")]] = Field(
-        {}, max_length=200
-    )
+    inputs: dict[VariableName, Entry] = Field({}, max_length=200)
     """The entry of the observation that each input of the FMU receives. An input that is not listed receives the entry
     of its name; without such an entry it keeps its start value."""
     outputs: dict[Control, VariableName] = Field({}, max_length=2)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field, model_validator
@@ -224,8 +223,3 @@ class Scene(Document):
 
 
 SCENE_FILE = "scene.toml"
-
-
-def scene_file(folder: Path) -> Path:
-    """The scene document in the folder of a scene."""
-    return folder / SCENE_FILE

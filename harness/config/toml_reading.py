@@ -157,17 +157,14 @@ def _problems(path: Path, model: type[BaseModel], error: Any) -> Iterator[Proble
     elif cause is not None:
         yield Problem(str(path), key, str(cause))
     else:
-        yield Problem(str(path), key, f"{_shown(error['input'])} is not possible", _lower(error["msg"]))
+        message = error["msg"]
+        yield Problem(str(path), key, f"{_shown(error['input'])} is not possible", message[0].lower() + message[1:])
 
 
 def _shown(value: Any) -> str:
     if isinstance(value, dict | list):
         return "this table" if isinstance(value, dict) else "this list"
     return repr(value)[:60]
-
-
-def _lower(message: str) -> str:
-    return message[0].lower() + message[1:]
 
 
 def _model_at(model: type[BaseModel], location: list[Any]) -> type[BaseModel] | None:

@@ -95,11 +95,8 @@ class Adjustable(Document):
         if not low < high:
             return place, f"the range {low:g} to {high:g} is empty", "write the lower bound first"
         if not low <= value <= high:
-            return (
-                place,
-                f"the value in the document, {value:g}, is not within {low:g} to {high:g}",
-                "change one of them",
-            )
+            message = f"the value in the document, {value:g}, is not within {low:g} to {high:g}"
+            return place, message, "change one of them"
         for bound in (low, high):
             try:
                 self._with({key: bound}, {})

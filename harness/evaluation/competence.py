@@ -1,5 +1,6 @@
-"""The competence gate: a verdict counts only if its players reach their goals without the other player.
+"""The research questions on two arms with their possible answers, and the competence gate.
 
+A verdict counts only if its players reach their goals without the other player.
 A person that wrecks itself on the empty road and an ego that fails against everybody answer no research question. So
 every question names the least share of goals of its players alone (`AloneBound`, from the campaign's table
 `[competence]`). The share is measured in the arms in which they are assessed alone, by the point estimate: goals per
@@ -10,13 +11,70 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from enum import Enum
 from typing import TYPE_CHECKING, Any, Literal
 
-from harness.evaluation.research_questions import AloneBound, Verdict
 from harness.evaluation.rule_book.thresholds import WRONG_WAY_LEAST_S
 
 if TYPE_CHECKING:
     import pandas as pd
+
+ResearchQuestion = Literal["RQ1", "RQ2"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class AloneBound:
+    """What a player has to achieve without the other player before a verdict on it counts."""
+
+    player: Literal["ego", "non_ego"]
+    words: str
+    """The player in sentences, such as "the naive ego"."""
+    arm: str
+    """The arm in which it drives alone."""
+    goal_share: float
+    """The least share of that arm's games in which it reaches its goal."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Question:
+    """One research question, asked of one persona and training seed: two arms of the same episodes."""
+
+    question: ResearchQuestion
+    persona: str
+    seed: int
+    baseline: str
+    treatment: str
+    alone: tuple[AloneBound, ...] = ()
+    """What its players have to achieve alone; otherwise it is not answered."""
+
+
+class Verdict(str, Enum):
+    """Every value the column `verdict` can have."""
+
+    SIGNIFICANT = "significant"
+    """p_holm < significance (and so p_value < significance)."""
+    BEFORE_HOLM_ONLY = "significant before Holm's correction only"
+    """p_value < significance <= p_holm."""
+    NOT_SIGNIFICANT = "not significant"
+    NO_DIFFERENCE = "no difference"
+    """Every difference is 0, so there is no t statistic."""
+    ALL_EQUAL = "no t statistic: all differences equal"
+    """Every difference is the same number, not 0. For failures `mcnemar_p` still exists."""
+    NOT_ENOUGH_PAIRS = "not enough pairs"
+    """Fewer than two pairs could be compared."""
+    EGO_CANNOT_DRIVE = "not answered: the ego can't drive this scene"
+    """An ego of the question reaches its goal alone in fewer games than `AloneBound` asks. This verdict and the next
+    three go before all others: there is no test."""
+    NON_EGO_CANNOT_DRIVE = "not answered: the person can't drive this scene"
+    NEITHER_CAN_DRIVE = "not answered: neither the ego nor the person can drive this scene"
+    NOT_PLAYED_ALONE = "not answered: a player was not played alone"
+    """It is not known whether the players can drive the scene."""
+
+
+INCOMPETENT = frozenset(
+    {Verdict.EGO_CANNOT_DRIVE, Verdict.NON_EGO_CANNOT_DRIVE, Verdict.NEITHER_CAN_DRIVE, Verdict.NOT_PLAYED_ALONE}
+)
+"""The verdicts on players that were not shown to drive the scene."""
 
 DID_NOT_LEARN = "did not learn"
 """How a training ended whose player misses its bound alone, whatever stopped it."""
@@ -87,18 +145,9 @@ def broken_by(record: Mapping[str, Any]) -> str:
     return next((rule for rule, (_, column, least) in RULES.items() if (record.get(column) or 0.0) >= least), "")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Gate:
-    """Why a question is not answered, as cells of a table; both are empty if it is."""
-
-    verdict: str = ""
-    """One of `INCOMPETENT`."""
-    reason: str = ""
-    """Each player below its bound, with its share; a sentence without a capital letter and a full stop."""
-
-
-def gate(bounds: Iterable[AloneBound], seed: int, games: Mapping[Any, pd.DataFrame]) -> Gate:
-    """Why a verdict on these players does not count, if it does not.
+def gate(bounds: Iterable[AloneBound], seed: int, games: Mapping[Any, pd.DataFrame]) -> dict[str, str]:
+    """Why a verdict on these players does not count, as the cells `verdict` (one of `INCOMPETENT`) and `reason` (each
+    player below its bound, with its share) of a table; both are empty if it counts.
 
     `games` are the rows of episodes.csv by (arm, seed). A bound of 0 is always met.
     """
@@ -116,10 +165,10 @@ def gate(bounds: Iterable[AloneBound], seed: int, games: Mapping[Any, pd.DataFra
             unknown = f"so it is not known how {bound.words} drives"
             clauses.append(f"no game of the arm {bound.arm} could be played, {unknown}")
     if not clauses:
-        return Gate()
+        return {"verdict": "", "reason": ""}
     verdict = {
         frozenset({"ego"}): Verdict.EGO_CANNOT_DRIVE,
         frozenset({"non_ego"}): Verdict.NON_EGO_CANNOT_DRIVE,
         frozenset({"ego", "non_ego"}): Verdict.NEITHER_CAN_DRIVE,
     }.get(frozenset(incapable), Verdict.NOT_PLAYED_ALONE)
-    return Gate(verdict=verdict.value, reason="; ".join(dict.fromkeys(clauses)))
+    return {"verdict": verdict.value, "reason": "; ".join(dict.fromkeys(clauses))}

@@ -41,11 +41,6 @@ class Drive:
         return self.game.world.step_s
 
     @property
-    def steers(self) -> bool:
-        """Whether its steering is known: SUMO's cars change lanes without a steering angle."""
-        return bool(self.game.steers[self.player])
-
-    @property
     def acceleration_mps2(self) -> FloatArray:
         """Along its heading."""
         return self.game.while_driving(self.game.quantities.state.acceleration_mps2, self.player)
@@ -83,12 +78,12 @@ METRICS: list[Metric] = []
 
 
 def metric(
-    *whose: str, meaning: str, dtype: str = NUMBER, unit: str = "", source: str = "", mean: str = ""
+    *whose: str, meaning: str, dtype: str = NUMBER, source: str = "", mean: str = ""
 ) -> Callable[[Callable[[Any], Value]], Callable[[Any], Value]]:
     """Enter a function of a `Drive` into `METRICS`: its name is that of the column."""
 
     def enter(function: Callable[[Any], Value]) -> Callable[[Any], Value]:
-        column = Column(function.__name__, dtype, meaning, unit=unit, source=source)
+        column = Column(function.__name__, dtype, meaning, source=source)
         METRICS.append(Metric(column=column, whose=whose, mean=mean, of=function))
         return function
 
@@ -138,7 +133,8 @@ def max_deceleration_mps2(drive: Drive) -> float | None:
     mean="max_lateral_acceleration_mps2",
 )
 def max_lateral_acceleration_mps2(drive: Drive) -> float | None:
-    return finite(np.abs(drive.of("lateral_acceleration_mps2")), np.max) if drive.steers else None
+    steering_is_known = drive.game.steers[drive.player]  # SUMO's cars change lanes without a steering angle
+    return finite(np.abs(drive.of("lateral_acceleration_mps2")), np.max) if steering_is_known else None
 
 
 @metric("ego", meaning="Time until the goal; empty without it.")

@@ -8,7 +8,6 @@ long as the game still does not fail without this part of the change; what is le
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,19 +16,11 @@ from harness.game.arrays import FloatArray
 MOST_GAMES = 200
 
 
-@dataclass(frozen=True, kw_only=True)
-class Minimised:
-    """Two neighbouring starts [D], one on each side of the failure, and the number of games played to find them."""
-
-    fails: FloatArray
-    passes: FloatArray
-    games: int
-
-
 def minimise(
     fails: Callable[[FloatArray], bool], failing: FloatArray, passing: FloatArray, tolerance: FloatArray
-) -> Minimised:
-    """The smallest change found from `failing` towards `passing`, in all coordinates within `tolerance` (all [D]).
+) -> tuple[FloatArray, FloatArray, int]:
+    """The smallest change found from `failing` towards `passing`, in all coordinates within `tolerance` (all [D]):
+    two neighbouring starts, one on each side of the failure, and the number of games played to find them.
 
     `fails` plays a start. Both ends are taken as played. At most `MOST_GAMES` games are played.
     """
@@ -53,7 +44,7 @@ def minimise(
                 near_fail, near_pass = _bisected(plays_badly, failing, without, tolerance)
                 kept = True
                 break
-    return Minimised(fails=near_fail, passes=near_pass, games=played)
+    return near_fail, near_pass, played
 
 
 def _bisected(

@@ -88,14 +88,8 @@ def join_traces(parts: Sequence[Path], path: Path, labels: Mapping[str, str | in
     _write((group for part in parts for group in _row_groups(part)), path, SCHEMA.with_metadata(metadata or None))
 
 
-def read_trace(path: Path, episode: int) -> pd.DataFrame:
-    """One game's trace; empty if the file has none of that episode. Raises UsageError if it is not a file of traces,
-    or contains values that no game can have."""
-    return TraceReader().read(path, episode)
-
-
 def read_traces(path: Path) -> Iterator[tuple[int, pd.DataFrame]]:
-    """The games of a file in order, each with its episode, as of `read_trace`. Reads one segment at a time."""
+    """The games of a file in order, each with its episode. Reads one segment at a time."""
     rest = SCHEMA.empty_table().to_pandas()
     for group in _row_groups(path):
         rows = _with_strings(group.to_pandas())
@@ -122,7 +116,10 @@ class TraceReader:
         self._kept: OrderedDict[tuple[str, int], pa.Table] = OrderedDict()
 
     def read(self, path: Path, episode: int) -> pd.DataFrame:
-        """As `read_trace`."""
+        """One game's trace; empty if the file has none of that episode.
+
+        Raises UsageError if it is not a file of traces, or contains values that no game can have.
+        """
         try:
             if path not in self._segments:
                 self._segments[path] = _segments_of(path)

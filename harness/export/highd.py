@@ -12,8 +12,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from harness.export.exported_game import Body, ExportedGame
-from harness.export.kinds import BUS, PERSON, THING, TRAM, TRUCK
+from harness.export.exported_game import BUS, PERSON, THING, TRAM, TRUCK, Body, ExportedGame
 from harness.export.lane_courses import NONE, LaneCourses
 from harness.game.arrays import FloatArray, IntArray
 

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 from scenariogeneration import xosc
 
-from harness.export.exported_game import Body, ExportedGame
-from harness.export.kinds import PERSON, THING
+from harness.export.exported_game import PERSON, THING, Body, ExportedGame
 from harness.export.opendrive import NO_DATE, ROAD_FILE, RoadFile
 from harness.replay.floating_car_data import xml_text
 from harness.replay.scenery import phases_of

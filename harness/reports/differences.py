@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from harness.evaluation.research_questions import Verdict
+from harness.evaluation.competence import Verdict
 from harness.reports.numbers import MISSING, NO_SPACE, SURE, number, p_text, signed, trimmed
 from harness.reports.run_tables import Row
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import pandas as pd
 
+from harness.evaluation.competence import Verdict
 from harness.evaluation.game_theory.findings import GameFindings
-from harness.evaluation.research_questions import Verdict
 from harness.reports.data_table import table
 from harness.reports.game_links import GameLinks
 from harness.reports.game_wording import equilibrium_sentences, fewer_failures, gap_verdicts

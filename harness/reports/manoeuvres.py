@@ -7,7 +7,7 @@ from typing import Any
 
 import pandas as pd
 
-from harness.evaluation.rule_book.cause_lines import event_words
+from harness.evaluation.rule_book.causes import event_words
 from harness.reports.embedding import key
 
 RUN_UP_S = 1.5

@@ -13,7 +13,7 @@ from harness.config.campaign import LEARNED, ego_called
 from harness.evaluation.comparisons.acceptance_checks import Check
 from harness.evaluation.comparisons.preventability import Preventability, preventability_of
 from harness.evaluation.game_theory.findings import GameFindings
-from harness.evaluation.rule_book.cause_lines import cause_lines
+from harness.evaluation.rule_book.causes import cause_lines
 from harness.evaluation.strategies import (
     NAIVE_ALONE,
     Arm,

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from harness.evaluation.research_questions import INCOMPETENT, Verdict
+from harness.evaluation.competence import INCOMPETENT, Verdict
 from harness.reports.differences import CHANCE, NO_T_STATISTIC, speed_sentence, too_few
 from harness.reports.numbers import p_text
 from harness.reports.run_tables import Row, RunTables, failures_of, played

@@ -6,9 +6,6 @@ but for rounding.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from functools import cache
 from typing import Any, cast
 
 import numpy as np
@@ -39,24 +36,15 @@ from harness.training.ppo_kernel import (
     epoch,
 )
 
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """One thread for BLAS: for matrices of this size more threads wait for each other."""
-    with _thread_pools().limit(limits=1, user_api="blas"):
-        yield
-
-
-@cache
-def _thread_pools() -> ThreadpoolController:
-    return ThreadpoolController()
+_one_thread = ThreadpoolController().wrap(limits=1, user_api="blas")
+"""One thread for BLAS: for matrices of this size more threads wait for each other."""
 
 
 class CompiledPPO(PPO):
     """PPO for the policy that the harness trains: a diagonal Gaussian whose actor and critic have hidden layers of tanh
     units of the same sizes and share none, in float32 on the CPU, by Adam and without clipping of values."""
 
-    @_one_thread()
+    @_one_thread
     def collect_rollouts(
         self, env: VecEnv, callback: BaseCallback, rollout_buffer: RolloutBuffer, n_rollout_steps: int
     ) -> bool:
@@ -98,7 +86,7 @@ class CompiledPPO(PPO):
         callback.on_rollout_end()
         return True
 
-    @_one_thread()
+    @_one_thread
     def train(self) -> None:
         """Update the policy from the rollout buffer.
 

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.evaluation.competence import DID_NOT_LEARN
-from harness.evaluation.research_questions import INCOMPETENT
+from harness.evaluation.competence import DID_NOT_LEARN, INCOMPETENT
 from harness.evaluation.tables import read_csv
 from tests.support.pages import Page
 from tests.support.shared import built_once

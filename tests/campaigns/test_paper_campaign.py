@@ -15,9 +15,9 @@ from harness.drivers.policy_file import read_policy
 from harness.evaluation.columns import TABLES
 from harness.evaluation.comparisons.comparison import compare
 from harness.evaluation.comparisons.summary import summarise
-from harness.evaluation.research_questions import Question
+from harness.evaluation.competence import Question
 from harness.evaluation.tables import read_csv
-from harness.evaluation.trace_file import read_trace
+from harness.evaluation.trace_file import TraceReader
 from harness.replay import replay_name
 from harness.road.scene.open_scene import open_scene
 from tests.support.replays import assert_plays
@@ -131,7 +131,7 @@ def test_campaign__every_failed_game_has_a_replay(run: Path, episodes: pd.DataFr
 
 def test_campaign__sumo_plays_a_replay_as_it_was_recorded(run: Path, tmp_path: Path) -> None:
     folder = shutil.copytree(run / "replays" / replay_name("naive_vs_speedy", 1, 1), tmp_path / "replay")
-    trace, scene = read_trace(run / "traces" / "naive_vs_speedy-seed1.parquet", 1), open_scene(run / "scene")
+    trace, scene = TraceReader().read(run / "traces" / "naive_vs_speedy-seed1.parquet", 1), open_scene(run / "scene")
     types = [scene.vehicle(player).vehicle_type for player in range(2)]
     assert_plays(folder, trace, dict(zip(types, scene.world.length_m, strict=True)))
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from harness.evaluation.tables import read_csv
-from harness.evaluation.trace_file import read_trace
+from harness.evaluation.trace_file import TraceReader
 from tests.support.scenes import THREE_PEOPLE, build_scene
 from tests.support.shared import built_once
 from tests.support.tiny import SPEEDY, TRAINING, finished, harness, write_persona
@@ -61,7 +61,7 @@ def test_campaign__all_people_take_part_beside_the_ego_and_one_at_a_time_without
 
 def test_campaign__a_crowd_has_the_policies_of_its_personas(run: Path) -> None:
     def first_acceleration_mps2(arm: str, person: str) -> float:
-        trace = read_trace(run / "traces" / f"{arm}-seed1.parquet", 0)
+        trace = TraceReader().read(run / "traces" / f"{arm}-seed1.parquet", 0)
         return float(trace[(trace["player"] == person) & (trace["step"] == 1)]["acceleration_mps2"].iloc[0])
 
     # The first decision is made from the start, which is the same in all arms.

@@ -12,10 +12,9 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from harness.campaign.preflight import open_campaign
-from harness.cli.persona_template import check_persona, create_persona, persona_template
-from harness.config.human_limits import AttentionLapses, Perception
+from harness.cli.new_documents import check_persona, create_persona, persona_template
 from harness.config.json_schema import schema_of
-from harness.config.persona import Persona
+from harness.config.persona import AttentionLapses, Perception, Persona
 from harness.config.toml_reading import read_document
 from harness.errors import UsageError
 from harness.game.payoff_terms import FUZZY_QUANTITIES, TERMS

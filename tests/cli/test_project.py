@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from harness.campaign.preflight import open_campaign
-from harness.cli.project import create_project
+from harness.cli.new_documents import create_project
 from harness.errors import UsageError
 
 

@@ -15,8 +15,7 @@ import pandas as pd
 import pytest
 
 from harness.evaluation.recorded_game import BodyKind
-from harness.evaluation.rule_book.cause_lines import cause_lines
-from harness.evaluation.rule_book.causes import Cause, cause_of
+from harness.evaluation.rule_book.causes import cause_lines, cause_of
 from harness.evaluation.rule_book.course import Course
 from harness.evaluation.tables import table_of
 from harness.game.sight import Hiding
@@ -36,7 +35,7 @@ def course(world: World, *players: list[dict[str, Any]]) -> Course:
     return Course(game=game(world, pd.DataFrame([row for player in players for row in player]), KINDS))
 
 
-def cause(merge: Any, *players: list[dict[str, Any]]) -> Cause:
+def cause(merge: Any, *players: list[dict[str, Any]]) -> dict[str, Any]:
     found = cause_of(course(merge.world, *players))
     assert found is not None
     return found
@@ -59,14 +58,14 @@ def test_cut_in__begins_when_the_body_crosses_the_lane_mark(merge: Any) -> None:
     # from y = -1.6 to -4.1 m in 15 steps: its right side, 0.9 m beside the centre, is at -3.2 m when the centre is at
     # -2.3 m: 0.7 / 2.5 * 15 = 4.2 steps after step 5; the first step beyond it is step 10, 1.0 s before the end
     found = cause(merge, ego(), rows("non_ego", sideways(25.0, -1.6, -4.1)))
-    assert (found.other, found.deed) == ("non_ego", "cuts in from the left")
-    assert (found.time_s, found.time_left_s) == (1.0, 1.0)
-    assert (found.ego_saw, found.reaction, found.braking_mps2) == ("yes", "no reaction", 0.0)
+    assert (found["other"], found["deed"]) == ("non_ego", "cuts in from the left")
+    assert (found["time_s"], found["time_left_s"]) == (1.0, 1.0)
+    assert (found["ego_saw"], found["reaction"], found["braking_mps2"]) == ("yes", "no reaction", 0.0)
 
 
 def test_drift__is_a_body_that_crosses_the_mark_in_a_lapse(merge: Any) -> None:
     found = cause(merge, ego(), rows("non_ego", sideways(25.0, -1.6, -4.1), lapsed=range(4, STEPS)))
-    assert found.deed == "drifts into the ego's lane from the left, inattentive"
+    assert found["deed"] == "drifts into the ego's lane from the left, inattentive"
 
 
 @pytest.mark.parametrize(
@@ -74,21 +73,21 @@ def test_drift__is_a_body_that_crosses_the_mark_in_a_lapse(merge: Any) -> None:
 )
 def test_ego__saw_it_if_it_was_attentive_in_some_step(merge: Any, lapsed: Sequence[int], saw: bool) -> None:
     found = cause(merge, ego(lapsed=lapsed), rows("non_ego", sideways(25.0, -1.6, -4.1)))
-    assert found.ego_saw == ("yes" if saw else "no")
+    assert found["ego_saw"] == ("yes" if saw else "no")
 
 
 def test_reaction__braking_is_one(merge: Any) -> None:
     speeds = [10.0] * 15 + [9.7, 9.4, 9.1, 8.8, 8.5, 8.2]
     poses = [(20.0 + k, -4.8, 0.0, speed) for k, speed in enumerate(speeds)]
     found = cause(merge, ego(poses=poses), rows("non_ego", sideways(25.0, -1.6, -4.1)))
-    assert (found.reaction, found.braking_mps2) == ("brakes", pytest.approx(3.0))
+    assert (found["reaction"], found["braking_mps2"]) == ("brakes", pytest.approx(3.0))
 
 
 def test_reaction__braking_earlier_is_none(merge: Any) -> None:
     speeds = [14.0] * 3 + [12.0] + [10.0] * 31  # 20 m/s2 until 0.4 s; the mark is crossed at 2.4 s
     poses = [(10.0 + k, -4.8, 0.0, speed) for k, speed in enumerate(speeds)]
     other = [(14.0 + 0.8 * k, -1.6, 0.0, 8.0) for k in range(14)] + sideways(25.2, -1.6, -4.1)
-    assert cause(merge, ego(poses=poses), rows("non_ego", other)).reaction == "no reaction"
+    assert cause(merge, ego(poses=poses), rows("non_ego", other))["reaction"] == "no reaction"
 
 
 NORTHBOUND = along(40.0, -9.8, NORTH, 2.0, STEPS)
@@ -109,13 +108,13 @@ BRAKING = [(41.0 + 0.2 * k, -4.8, 0.0, 2.0 if k < 10 else 1.0) for k in range(ST
     ],
 )
 def test_deed__of_the_other_road_user(other: list[dict[str, Any]], deed: str, merge: Any) -> None:
-    assert cause(merge, ego(), other).deed == deed
+    assert cause(merge, ego(), other)["deed"] == deed
 
 
 def test_oncoming__the_danger_lasts_from_the_start(merge: Any) -> None:
     # the centres are 45 m apart and close at 20 m/s: 40 m between the bumpers, so danger in all 2 s
     oncoming = rows("non_ego", along(65.0, -4.8, 2 * NORTH, 10.0, STEPS))
-    assert cause(merge, ego(), oncoming).time_left_s == 2.0
+    assert cause(merge, ego(), oncoming)["time_left_s"] == 2.0
 
 
 def test_hidden__behind_a_van_until_it_is_past_it(merge: Any) -> None:
@@ -125,20 +124,21 @@ def test_hidden__behind_a_van_until_it_is_past_it(merge: Any) -> None:
     world = replace(merge.world, hiding=Hiding(vehicles=True))
     found = cause_of(course(world, ego(), van, walker))
     assert found is not None
-    assert found.ego_saw == "yes"
-    assert 0.0 < found.hidden_until_s < found.time_left_s
+    assert found["ego_saw"] == "yes"
+    assert 0.0 < found["hidden_until_s"] < found["time_left_s"]
 
 
 def test_ego__that_changes_into_the_other_s_lane(merge: Any) -> None:
     found = cause(merge, ego(poses=sideways(20.0, -1.6, -4.1)), rows("non_ego", along(22.0, -5.2, 0.0, 8.0, STEPS)))
-    assert found.deed == "the ego changes into its lane, to the right"
+    assert found["deed"] == "the ego changes into its lane, to the right"
 
 
 def test_rail__with_and_without_a_road_user_near(merge: Any) -> None:
     alone = cause(merge, ego("rail"))
-    assert (alone.other, alone.deed, alone.ego_saw) == ("", "the ego leaves the road with no road user near", "")
+    assert alone["deed"] == "the ego leaves the road with no road user near"
+    assert not {"other", "ego_saw"} & alone.keys()
     near = cause(merge, ego("rail"), rows("non_ego", along(41.0, -4.8, 0.0, 2.0, STEPS)))
-    assert (near.other, near.deed) == ("non_ego", "drives ahead of the ego")
+    assert (near["other"], near["deed"]) == ("non_ego", "drives ahead of the ego")
 
 
 def test_goal__has_no_cause(merge: Any) -> None:

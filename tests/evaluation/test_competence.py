@@ -8,8 +8,7 @@ import pandas as pd
 import pytest
 
 from harness.evaluation.comparisons.comparison import compare, games_by_arm
-from harness.evaluation.competence import Gate, Goals, gate, goals_alone
-from harness.evaluation.research_questions import AloneBound, Question, Verdict
+from harness.evaluation.competence import AloneBound, Goals, Question, Verdict, gate, goals_alone
 
 EGO = AloneBound(player="ego", words="the naive ego", arm="naive_alone", goal_share=0.97)
 PERSON = AloneBound(player="non_ego", words="the speedy driver", arm="speedy_alone", goal_share=0.8)
@@ -112,29 +111,29 @@ def test_goals__a_share_below_its_bound_is_never_shown_as_the_bound() -> None:
 )
 def test_gate__names_who_cannot_drive(ego: int, person: int, verdict: str) -> None:
     found = gate(RQ1.alone, 1, games_by_arm(table(ego, person)))
-    assert found.verdict == verdict
+    assert found["verdict"] == verdict
     share = Goals(goals=person, played=100).below(0.8)
-    assert ("the naive ego can't drive this scene" in found.reason) == (ego < 97)
-    assert (f"the speedy driver can't drive this scene: {share}" in found.reason) == (person < 80)
+    assert ("the naive ego can't drive this scene" in found["reason"]) == (ego < 97)
+    assert (f"the speedy driver can't drive this scene: {share}" in found["reason"]) == (person < 80)
 
 
 def test_gate__players_that_were_not_played_alone_are_not_taken_on_trust() -> None:
     episodes = table(100, 100)
     closed = gate(RQ1.alone, 1, games_by_arm(episodes[episodes["arm"] != "speedy_alone"]))
-    assert closed.verdict == Verdict.NOT_PLAYED_ALONE.value
-    assert "no game of the arm speedy_alone could be played" in closed.reason
+    assert closed["verdict"] == Verdict.NOT_PLAYED_ALONE.value
+    assert "no game of the arm speedy_alone could be played" in closed["reason"]
 
 
 def test_gate__a_bound_of_0_asks_nothing() -> None:
     free = [AloneBound(player="ego", words="the naive ego", arm="naive_alone", goal_share=0.0)]
-    assert gate(free, 1, {}) == gate([], 1, {}) == Gate()
+    assert gate(free, 1, {}) == gate([], 1, {}) == {"verdict": "", "reason": ""}
 
 
 def test_gate__is_asked_for_each_seed() -> None:
     good, bad = table(100, 100), table(100, 0).assign(seed=2)
     games = games_by_arm(pd.concat([good, bad], ignore_index=True))
-    assert not gate(RQ1.alone, 1, games).reason
-    assert gate(RQ1.alone, 2, games).reason
+    assert not gate(RQ1.alone, 1, games)["reason"]
+    assert gate(RQ1.alone, 2, games)["reason"]
 
 
 # --- comparisons ------------------------------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ from harness.evaluation.encounters import Encounter
 from harness.evaluation.metrics import accepted_gap_s, min_pet_s, pet_priority
 from harness.evaluation.recorded_game import BodyKind
 from harness.evaluation.rule_book.course import Course
-from harness.evaluation.rule_book.named_manoeuvres import Manoeuvre, find_manoeuvres
+from harness.evaluation.rule_book.named_manoeuvres import find_manoeuvres
 from harness.game.arrays import FloatArray
 from harness.game.junctions import Control
 from harness.game.world import World
@@ -61,9 +61,11 @@ def met(world: World, *cars: pd.DataFrame) -> list[Encounter]:
     return list(game(world, trace_of(*cars), KINDS).encounters[0])
 
 
-def named(world: World, *cars: pd.DataFrame) -> list[Manoeuvre]:
+def named(world: World, *cars: pd.DataFrame) -> list[dict[str, Any]]:
     new = ("fails_to_yield", "turns_across", "runs_red", "rolls_through", "wrong_way")
-    return [each for each in find_manoeuvres(Course(game=game(world, trace_of(*cars), KINDS))) if each.manoeuvre in new]
+    return [
+        each for each in find_manoeuvres(Course(game=game(world, trace_of(*cars), KINDS))) if each["manoeuvre"] in new
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -160,13 +162,13 @@ def test_gap__that_is_too_short_is_named(
     conflict: dict[str, Any], y_m: float, names: list[str], merge: OpenScene
 ) -> None:
     world = with_conflicts(merge.world, {**CROSSING, **conflict})
-    assert [each.manoeuvre for each in named(world, ego(), northbound(y_m))] == names
+    assert [each["manoeuvre"] for each in named(world, ego(), northbound(y_m))] == names
 
 
 def test_fails_to_yield__has_its_gap_begin_and_end(world: World) -> None:
     (found,) = named(world, ego(), northbound(-44.3))
-    assert found.text == "does not yield to traffic, 1.0 s away"
-    assert (found.time_s, found.until_s) == (pytest.approx(2.9), pytest.approx(3.6))
+    assert found["text"] == "does not yield to traffic, 1.0 s away"
+    assert (found["time_s"], found["until_s"]) == (pytest.approx(2.9), pytest.approx(3.6))
 
 
 def lines(merge: OpenScene, control: Control) -> World:
@@ -176,14 +178,14 @@ def lines(merge: OpenScene, control: Control) -> World:
 @pytest.mark.parametrize(("letters", "count"), [("rG", 1), ("uG", 1), ("yG", 0), ("Gr", 0), ("gG", 0), ("OO", 0)])
 def test_runs_red__passes_the_line_on_red(merge: OpenScene, letters: str, count: int) -> None:
     found = named(lines(merge, Control.SIGNAL), ego(signals=f"light={letters}"))
-    assert [each.manoeuvre for each in found] == ["runs_red"] * count
+    assert [each["manoeuvre"] for each in found] == ["runs_red"] * count
 
 
 def test_runs_red__states_the_time_since_the_onset(merge: OpenScene) -> None:
     drive = ego()  # its front is at 90 m after 2 s
     drive["signals"] = np.where(drive["step"] < 12, "light=yr", "light=rG")
     (found,) = named(lines(merge, Control.SIGNAL), drive)
-    assert found.text == "passes a red light, 1.0 s after its onset"
+    assert found["text"] == "passes a red light, 1.0 s after its onset"
 
 
 def slowing(to_mps: float) -> FloatArray:
@@ -195,7 +197,7 @@ def slowing(to_mps: float) -> FloatArray:
 @pytest.mark.parametrize("control", [Control.STOP, Control.ALL_WAY_STOP])
 def test_rolls_through__a_stop_sign(merge: OpenScene, control: Control, least_mps: float, names: list[str]) -> None:
     found = named(lines(merge, control), ego(speed_mps=slowing(least_mps)))
-    assert [each.manoeuvre for each in found] == names
+    assert [each["manoeuvre"] for each in found] == names
 
 
 def test_rolls_through__no_other_line(merge: OpenScene) -> None:
@@ -208,4 +210,4 @@ def test_wrong_way__among_oncoming_lanes_for_a_second(merge: OpenScene, speed_mp
     there = (routes.x_m > 80.0) & (routes.x_m < 100.0)  # the ego's line is beyond its own lanes
     oncoming = replace(road, routes=routes._replace(own_left_m=np.where(there, -0.1, routes.own_left_m)))
     found = named(replace(merge.world, road=oncoming), ego(speed_mps=speed_mps))
-    assert [each.manoeuvre for each in found] == (["wrong_way"] if seconds >= 1.0 else [])
+    assert [each["manoeuvre"] for each in found] == (["wrong_way"] if seconds >= 1.0 else [])

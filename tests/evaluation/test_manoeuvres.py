@@ -13,10 +13,9 @@ import pytest
 
 from harness.evaluation.recorded_game import BodyKind
 from harness.evaluation.rule_book import thresholds
-from harness.evaluation.rule_book.cause_lines import event_words
-from harness.evaluation.rule_book.causes import cause_of
+from harness.evaluation.rule_book.causes import cause_of, event_words
 from harness.evaluation.rule_book.course import Course
-from harness.evaluation.rule_book.named_manoeuvres import NAMES, Manoeuvre, find_manoeuvres
+from harness.evaluation.rule_book.named_manoeuvres import NAMES, find_manoeuvres
 from harness.game.arrays import FloatArray, IntArray
 from harness.road.scene.open_scene import OpenScene
 from tests.support.rollouts import Steady, arm, play
@@ -62,18 +61,18 @@ def across(begin_m: float, end_m: float, first: int, last: int, steps: int = 60)
     return np.interp(np.arange(steps), [first, last], [begin_m, end_m])
 
 
-def named(scene: OpenScene, *cars: pd.DataFrame) -> list[Manoeuvre]:
+def named(scene: OpenScene, *cars: pd.DataFrame) -> list[dict[str, Any]]:
     trace = pd.concat(cars).sort_values(["step", "player"], ignore_index=True)
     driven = trace.loc[trace["steering_rad"] != 0.0, "player"].unique()
     return find_manoeuvres(Course(game=game(scene.world, trace, KINDS, steers=trace["player"].isin(driven))))
 
 
-def only(found: Sequence[Manoeuvre], player: str, name: str) -> list[Manoeuvre]:
-    return [each for each in found if (each.player, each.manoeuvre) == (player, name)]
+def only(found: Sequence[dict[str, Any]], player: str, name: str) -> list[dict[str, Any]]:
+    return [each for each in found if (each["player"], each["manoeuvre"]) == (player, name)]
 
 
-def names(found: Sequence[Manoeuvre], player: str) -> list[str]:
-    return [each.manoeuvre for each in found if each.player == player]
+def names(found: Sequence[dict[str, Any]], player: str) -> list[str]:
+    return [each["manoeuvre"] for each in found if each["player"] == player]
 
 
 # --- cut_in -----------------------------------------------------------------------------------------------------------
@@ -91,11 +90,13 @@ def cutting_in(gap_m: float, speed_mps: float = 12.0, **changes: Any) -> list[pd
 
 def test_cut_in__has_its_time_gap_and_time_to_collision(merge: OpenScene) -> None:
     (found,) = only(named(merge, *cutting_in(10.0, 8.0)), "non_ego", "cut_in")
-    assert found.time_s == 2.0  # its centre is 0.8 m from the mark, and half of its width is 0.9 m
-    assert found.gap_m == pytest.approx(10.0 + 0.4 * 4.0, abs=0.3)  # 0.4 s before their bodies begin to overlap
-    assert found.ttc_s == pytest.approx(found.gap_m / 4.0)
-    assert found.until_s == 3.2  # within half a metre of the ego's path
-    assert found.text == f"cuts in from the right, {found.gap_m:.1f} m ahead of the ego, TTC {found.ttc_s:.1f} s"
+    assert found["time_s"] == 2.0  # its centre is 0.8 m from the mark, and half of its width is 0.9 m
+    assert found["gap_m"] == pytest.approx(10.0 + 0.4 * 4.0, abs=0.3)  # 0.4 s before their bodies begin to overlap
+    assert found["ttc_s"] == pytest.approx(found["gap_m"] / 4.0)
+    assert found["until_s"] == 3.2  # within half a metre of the ego's path
+    assert (
+        found["text"] == f"cuts in from the right, {found['gap_m']:.1f} m ahead of the ego, TTC {found['ttc_s']:.1f} s"
+    )
 
 
 @pytest.mark.parametrize(
@@ -122,7 +123,7 @@ def test_cut_in__only_within_the_stated_gap_or_time_to_collision(
     ],
 )
 def test_cut_in__not_by_a_leader(cars: list[pd.DataFrame], merge: OpenScene) -> None:
-    assert "cut_in" not in [each.manoeuvre for each in named(merge, *cars)]
+    assert "cut_in" not in [each["manoeuvre"] for each in named(merge, *cars)]
 
 
 # --- hard_brake -------------------------------------------------------------------------------------------------------
@@ -144,14 +145,14 @@ def test_hard_brake__by_deceleration_and_duration(
     found = only(named(straight, car("ego", 20.0, RIGHT_Y, speed)), "ego", "hard_brake")
     assert len(found) == expected
     if found:
-        assert (found[0].time_s, found[0].until_s) == (pytest.approx(2.1), pytest.approx(2.0 + steps * STEP_S))
-        assert np.isnan([found[0].gap_m, found[0].ttc_s]).all()
+        assert (found[0]["time_s"], found[0]["until_s"]) == (pytest.approx(2.1), pytest.approx(2.0 + steps * STEP_S))
+        assert np.isnan([found[0]["gap_m"], found[0]["ttc_s"]]).all()
 
 
 def test_hard_brake__a_short_pause_does_not_split_it(straight: OpenScene) -> None:
     speed = 14.0 - 0.5 * np.cumsum(np.isin(np.arange(60), [10, 11, 12, 16, 17, 18, 40, 41, 42]))
     found = only(named(straight, car("ego", 20.0, RIGHT_Y, speed)), "ego", "hard_brake")
-    assert [(each.time_s, each.until_s) for each in found] == [(1.0, 1.8), (4.0, 4.2)]
+    assert [(each["time_s"], each["until_s"]) for each in found] == [(1.0, 1.8), (4.0, 4.2)]
 
 
 # --- swerve -----------------------------------------------------------------------------------------------------------
@@ -176,8 +177,8 @@ def test_swerve__by_lateral_acceleration_and_heading(
     found = only(named(straight, swerving(lateral_mps2, turned_deg, side=side)), "ego", "swerve")
     assert len(found) == swerves
     if found:
-        assert (found[0].time_s, found[0].until_s) == (2.0, 2.4)
-        assert ("left" if side > 0 else "right") in found[0].text
+        assert (found[0]["time_s"], found[0]["until_s"]) == (2.0, 2.4)
+        assert ("left" if side > 0 else "right") in found[0]["text"]
 
 
 def test_swerve__following_a_bend_is_not_one(tmp_path: Path) -> None:
@@ -223,8 +224,8 @@ def test_drift__a_lapse_in_which_the_car_moves_sideways(
     found = only(named(straight, car("non_ego", 20.0, y, lapsed=(10, 41))), "non_ego", "drift")
     assert len(found) == drifts
     if found:
-        assert (found[0].time_s, found[0].until_s) == (1.0, 4.0)
-        assert f"{abs(moved_m):.1f} m to the {'left' if moved_m > 0 else 'right'}" in found[0].text
+        assert (found[0]["time_s"], found[0]["until_s"]) == (1.0, 4.0)
+        assert f"{abs(moved_m):.1f} m to the {'left' if moved_m > 0 else 'right'}" in found[0]["text"]
 
 
 def test_drift__steered_movement_is_not_one(straight: OpenScene) -> None:
@@ -287,9 +288,9 @@ def test_overtake__from_behind_until_completely_ahead(
 
 def test_overtake__has_its_begin_and_end(merge: OpenScene) -> None:
     (found,) = only(named(merge, *overtaking(6.0, 6.0)), "non_ego", "overtake")
-    assert found.time_s == pytest.approx((6.0 - LENGTH_M) / 12.0 * 4.9, abs=0.11)
-    assert found.until_s == pytest.approx((6.0 + LENGTH_M) / 12.0 * 4.9, abs=0.11)
-    assert found.text.startswith("overtakes on the lane that ends, 5")  # draws level 55 m before it
+    assert found["time_s"] == pytest.approx((6.0 - LENGTH_M) / 12.0 * 4.9, abs=0.11)
+    assert found["until_s"] == pytest.approx((6.0 + LENGTH_M) / 12.0 * 4.9, abs=0.11)
+    assert found["text"].startswith("overtakes on the lane that ends, 5")  # draws level 55 m before it
 
 
 def test_overtake__only_on_a_lane_that_ends(straight: OpenScene, merge: OpenScene) -> None:
@@ -317,7 +318,7 @@ def test_tailgate__by_time_gap_duration_and_speed(
     found = only(named(straight, *cars), "non_ego", "tailgate")
     assert len(found) == tailgates
     if found:
-        assert found[0].gap_m == pytest.approx(gap_m, abs=0.3)
+        assert found[0]["gap_m"] == pytest.approx(gap_m, abs=0.3)
 
 
 # --- forced_stop ------------------------------------------------------------------------------------------------------
@@ -336,7 +337,7 @@ def test_forced_stop__at_the_end_of_the_lane(before_m: float, forced: bool, merg
     found = only(named(merge, car("non_ego", x, ENDING_Y, speed)), "non_ego", "forced_stop")
     assert len(found) == forced
     if found:
-        assert "before its lane ends" in found[0].text
+        assert "before its lane ends" in found[0]["text"]
 
 
 @pytest.mark.parametrize(("gap_m", "forced"), [(9.0, True), (12.0, False)])
@@ -346,8 +347,8 @@ def test_forced_stop__behind_another(gap_m: float, forced: bool, straight: OpenS
     found = only(named(straight, *cars), "ego", "forced_stop")
     assert len(found) == forced
     if found:
-        assert found[0].text.endswith("m behind another")
-        assert found[0].gap_m <= 9.1
+        assert found[0]["text"].endswith("m behind another")
+        assert found[0]["gap_m"] <= 9.1
 
 
 def test_forced_stop__not_on_an_open_road_nor_slowly_nor_without_earlier_speed(straight: OpenScene) -> None:

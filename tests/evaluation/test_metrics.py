@@ -30,7 +30,9 @@ def drive(outcome: Outcome = Outcome.GOAL, steers: bool = True, **changes: Any) 
     }
     series = {name: np.array(values) for name, values in {**of, **changes}.items()}
     shared = {"acceleration_mps2": series["acceleration_mps2"], "payoff": series["payoff"], "encounters": ()}
-    return SimpleNamespace(outcome=outcome, step_s=0.5, steers=steers, of=series.__getitem__, **shared)
+    return SimpleNamespace(
+        outcome=outcome, step_s=0.5, game=SimpleNamespace(steers=[steers]), player=0, of=series.__getitem__, **shared
+    )
 
 
 def test_metrics__by_hand() -> None:

@@ -89,5 +89,5 @@ def test_manoeuvres__name_the_person_and_before_which_player(tmp_path: Path) -> 
     moving = (trace["player"] == "non_ego_2") & (trace["step"] >= 10)
     trace.loc[moving, "y_m"] = np.maximum(LEFT_Y - 0.2 * (trace.loc[moving, "step"] - 9), RIGHT_Y)
     found = find_manoeuvres(Course(game=game(world, trace, {"ego_car": BodyKind(length_m=4.6)})))
-    cut_ins = [(each.player, each.text) for each in found if each.manoeuvre == "cut_in"]
+    cut_ins = [(each["player"], each["text"]) for each in found if each["manoeuvre"] == "cut_in"]
     assert cut_ins == [("non_ego_2", "cuts in from the left, 4.4 m ahead of the ego")]

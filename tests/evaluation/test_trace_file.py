@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from harness.evaluation import trace_file
-from harness.evaluation.trace_file import SCHEMA, TraceReader, join_traces, read_trace, trace_writer
+from harness.evaluation.trace_file import SCHEMA, TraceReader, join_traces, trace_writer
 from tests.support.traces import along, rows
 
 
@@ -30,7 +30,7 @@ def write(path: Path, *games: dict[str, list[Any]]) -> None:
 def test_trace__is_read_back_unchanged(tmp_path: Path) -> None:
     file = tmp_path / "naive_alone-seed1.parquet"
     write(file, game(0), game(1, steps=5), game(2))
-    trace = read_trace(file, 1)
+    trace = TraceReader().read(file, 1)
     assert list(trace.columns) == SCHEMA.names
     pd.testing.assert_frame_equal(trace, pd.DataFrame(game(1, steps=5)), check_dtype=False)
     assert trace["player"].tolist() == ["ego"] * 5
@@ -41,7 +41,7 @@ def test_trace__is_read_back_unchanged(tmp_path: Path) -> None:
 @pytest.mark.parametrize("games", [[game(0)], []])
 def test_trace__an_episode_that_is_not_there_is_empty(games: list[dict[str, list[Any]]], tmp_path: Path) -> None:
     write(tmp_path / "t.parquet", *games)
-    trace = read_trace(tmp_path / "t.parquet", 7)
+    trace = TraceReader().read(tmp_path / "t.parquet", 7)
     assert trace.empty
     assert list(trace.columns) == SCHEMA.names
 
@@ -56,7 +56,7 @@ def test_reader__keeps_segments_unchanged(most_rows: int, tmp_path: Path, monkey
     reader = TraceReader()
     for episode in (3, 0, 1, 7, 2, 3):
         found = reader.read(arm, episode)
-        pd.testing.assert_frame_equal(found, read_trace(arm, episode))
+        pd.testing.assert_frame_equal(found, TraceReader().read(arm, episode))
         found["x_m"] = 0.0  # a caller may change its copy
 
 
@@ -66,7 +66,7 @@ def test_trace__of_an_arm_says_whose_it_is(tmp_path: Path) -> None:
     assert pd.read_parquet(tmp_path / "arm.parquet").attrs == {"arm": "naive_alone", "seed": 1}
     metadata = pq.read_schema(tmp_path / "arm.parquet").metadata
     assert (metadata[b"arm"], metadata[b"seed"]) == (b"naive_alone", b"1")
-    assert len(read_trace(tmp_path / "arm.parquet", 1)) == len(game(1)["step"])
+    assert len(TraceReader().read(tmp_path / "arm.parquet", 1)) == len(game(1)["step"])
 
 
 def test_trace__equal_games_are_equal_bytes(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from harness.evaluation.comparisons.summary import summarise
-from harness.evaluation.research_questions import INCOMPETENT, Verdict
+from harness.evaluation.competence import INCOMPETENT, Verdict
 from harness.evaluation.worst_first import worst_first
 from harness.replay.selection import choose_games, replay_name
 from harness.reports import page as page_module

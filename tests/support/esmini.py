@@ -16,8 +16,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from harness.export.exported_game import Body
-from harness.export.kinds import BUILDING
+from harness.export.exported_game import BUILDING, Body
 from tests.support.tiny import PATIENCE_S
 
 _COLUMNS = {

@@ -18,7 +18,7 @@ from harness.config.campaign import Campaign
 from harness.evaluation.columns import TABLES
 from harness.evaluation.comparisons.comparison import compare
 from harness.evaluation.comparisons.summary import summarise
-from harness.evaluation.research_questions import ResearchQuestion
+from harness.evaluation.competence import ResearchQuestion
 from harness.evaluation.strategies import (
     NAIVE_ALONE,
     NAIVE_VS_SUMO,

@@ -28,7 +28,7 @@ from harness.drivers.mixture import mixture_of
 from harness.drivers.policy_file import policy_files
 from harness.errors import UsageError
 from harness.evaluation.minimising import minimise
-from harness.evaluation.rule_book.cause_lines import causes_in_words
+from harness.evaluation.rule_book.causes import causes_in_words
 from harness.evaluation.tables import read_csv
 from harness.evaluation.worst_first import worst_first
 from harness.files import make_folder, write_atomically
@@ -116,8 +116,7 @@ class PinnedGames:
             passing = next((each for each in self._passing(stage, failing) if not fails(each)), None)
             games = 1
             if passing is not None:
-                found = minimise(fails, failing, passing, _tolerance(failing))
-                failing, passing, games = found.fails, found.passes, found.games
+                failing, passing, games = minimise(fails, failing, passing, _tolerance(failing))
             last = trials.play(failing)
         starts = {"drawn_start": drawn, "start": failing, "no_failure_from": passing}
         pinned = PinnedGame.model_validate(

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from harness.campaign.plan.stages import TrainingStage
 from harness.config.campaign import Campaign, ego_called
-from harness.evaluation.research_questions import AloneBound
+from harness.evaluation.competence import AloneBound
 from harness.evaluation.strategies import (
     Arm,
     BestResponse,

@@ -20,7 +20,7 @@ from harness.campaign.plan.alone_bounds import alone_bounds
 from harness.campaign.plan.stages import AssessmentStage, SearchStage, Stage, TrainingStage
 from harness.campaign.plan.strategy_stages import SeedStages, ego_learns
 from harness.config.campaign import Campaign
-from harness.evaluation.research_questions import Question, ResearchQuestion
+from harness.evaluation.competence import Question, ResearchQuestion
 from harness.evaluation.strategies import (
     NAIVE_ALONE,
     NAIVE_VS_SUMO,

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import ClassVar, TypeAlias
 
-from harness.evaluation.research_questions import AloneBound
+from harness.evaluation.competence import AloneBound
 from harness.evaluation.strategies import Arm, BestResponse, ReconfiguredEgo, Strategy, player_of, strategy_name
 
 

@@ -19,9 +19,8 @@ from harness.evaluation.comparisons.acceptance_checks import Evidence, judge
 from harness.evaluation.comparisons.comparison import compare, games_by_arm
 from harness.evaluation.comparisons.preventability import count_prevented
 from harness.evaluation.comparisons.summary import summarise
-from harness.evaluation.competence import Goals, goals_alone
+from harness.evaluation.competence import Goals, Question, goals_alone
 from harness.evaluation.game_theory.findings import GameFindings, find
-from harness.evaluation.research_questions import Question
 from harness.evaluation.tables import table_of
 from harness.reports.run_tables import RunTables
 

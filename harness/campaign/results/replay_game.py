@@ -22,7 +22,7 @@ from harness.campaign.storage.run_folder import RunFolder
 from harness.config.toml_reading import nearest
 from harness.errors import UsageError, plain
 from harness.evaluation.people import people_in
-from harness.evaluation.rule_book.cause_lines import causes_in_words
+from harness.evaluation.rule_book.causes import causes_in_words
 from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import TraceReader
 from harness.evaluation.worst_first import FAILURES, worst_first

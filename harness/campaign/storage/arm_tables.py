@@ -11,7 +11,7 @@ The tables are made again when the log or the sources have changed: a new metric
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -80,9 +80,9 @@ def _made(folder: RunFolder, stage: str, scene: OpenScene) -> ArmTables:
         game = recorded_game(trace, scene)
         course, labels = Course(game=game), {name: row[name] for name in ("arm", "persona", "seed", "episode")}
         games[episode] = {**row, **measured(game)}
-        manoeuvres += [labels | asdict(each) for each in find_manoeuvres(course)]
+        manoeuvres += [labels | each for each in find_manoeuvres(course)]
         if (cause := cause_of(course)) is not None:
-            causes.append(labels | {"ego_outcome": row["ego_outcome"]} | asdict(cause))
+            causes.append(labels | {"ego_outcome": row["ego_outcome"]} | cause)
     return ArmTables(
         episodes=table_of("episodes", games.values(), len(people_in(played.columns))),
         causes=table_of("causes", causes),

@@ -33,8 +33,7 @@ import pandas as pd
 import scipy  # loads `scipy.stats` at its first use: workers do without
 
 from harness.evaluation.columns import TABLES
-from harness.evaluation.competence import Gate, gate
-from harness.evaluation.research_questions import Question, ResearchQuestion, Verdict
+from harness.evaluation.competence import Question, ResearchQuestion, Verdict, gate
 from harness.evaluation.tables import typed
 from harness.game.arrays import FloatArray
 
@@ -131,14 +130,16 @@ def rate_cells(name: str, successes: float, games: int) -> dict[str, float]:
     return {name: successes / games, f"{name}_low": float(interval.low), f"{name}_high": float(interval.high)}
 
 
-def _row(question: Question, metric: str, games: Mapping[Any, pd.DataFrame], closed: Gate) -> dict[str, object]:
+def _row(
+    question: Question, metric: str, games: Mapping[Any, pd.DataFrame], closed: dict[str, str]
+) -> dict[str, object]:
     column, sign = METRICS[metric]
     baseline, treatment, left_out = pairs_of(games, question.seed, question.baseline, question.treatment, [column])
     low, high = (baseline, treatment) if sign[question.question] > 0 else (treatment, baseline)
     low, high = low[:, 0], high[:, 0]
-    row = vars(question) | vars(closed) | {"metric": metric, "pairs": len(low), "pairs_left_out": left_out}
+    row = vars(question) | closed | {"metric": metric, "pairs": len(low), "pairs_left_out": left_out}
     row |= paired_t_test(low, high, closed)
-    if not closed.reason and metric == "failure" and len(low) >= 2:
+    if not closed["reason"] and metric == "failure" and len(low) >= 2:
         row["mcnemar_p"] = mcnemar(high - low, "greater")
     return row
 
@@ -177,7 +178,7 @@ def measured_values(rows: pd.DataFrame | None, columns: Sequence[str]) -> pd.Dat
     return values[list(columns)].astype("Float64").astype("float64").mask(errored.astype(bool))
 
 
-def paired_t_test(low: FloatArray, high: FloatArray, closed: Gate) -> dict[str, float]:
+def paired_t_test(low: FloatArray, high: FloatArray, closed: dict[str, str]) -> dict[str, float]:
     """H1: the mean of `high - low`, [N] each, is > 0. The result has the table's columns that exist for these pairs.
 
     Behind a closed gate there is no test: only the mean difference, which describes the games.
@@ -187,7 +188,7 @@ def paired_t_test(low: FloatArray, high: FloatArray, closed: Gate) -> dict[str, 
         return {}
     largest = float(np.abs([low, high]).max())
     mean = float(differences.mean())
-    if closed.reason or len(differences) < 2 or _all_equal(differences, largest):
+    if closed["reason"] or len(differences) < 2 or _all_equal(differences, largest):
         return {"mean_difference": 0.0 if abs(mean) <= ROUNDING * largest else mean}
     ci_low, ci_high = mean_interval(differences)
     test = scipy.stats.ttest_rel(high, low, alternative="greater")

@@ -23,8 +23,7 @@ from harness.evaluation.comparisons.comparison import (
     pairs_of,
     rate_cells,
 )
-from harness.evaluation.competence import gate
-from harness.evaluation.research_questions import AloneBound
+from harness.evaluation.competence import AloneBound, gate
 from harness.evaluation.tables import table_of, typed
 
 Role = Literal["ego", "non_ego"]
@@ -102,7 +101,7 @@ def _row(response: Response, games: Mapping[Any, pd.DataFrame]) -> dict[str, obj
     columns = [f"{response.role}_payoff", "ego_failed"]
     pair, best, left_out = pairs_of(games, response.seed, response.pair_arm, response.response_arm, columns)
     closed = gate(response.alone, response.seed, games)
-    row = vars(response) | vars(closed) | {"pairs": len(pair), "pairs_left_out": left_out}
+    row = vars(response) | closed | {"pairs": len(pair), "pairs_left_out": left_out}
     if not len(pair):
         return row
     payoff = float(pair[:, 0].mean())

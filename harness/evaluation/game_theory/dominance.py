@@ -6,6 +6,7 @@ The results hold for the means of a table: they are exact for the games that wer
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import scipy  # loads its parts at their first use: a worker that solves nothing does without
@@ -34,14 +35,8 @@ def _dominator(payoffs: FloatArray, strategy: int, names: Sequence[str]) -> str:
     if len(better):
         return names[better[0]]
     E, N = payoffs.shape
-    answer = scipy.optimize.linprog(
-        np.append(np.zeros(E), -1.0),
-        A_ub=np.hstack([-payoffs.T, np.ones((N, 1))]),
-        b_ub=-payoffs[strategy],
-        A_eq=np.append(np.ones(E), 0.0)[None],
-        b_eq=[1.0],
-        bounds=[(0.0, 1.0)] * E + [(None, None)],
-    )
+    margins = np.hstack([-payoffs.T, np.ones((N, 1))])
+    answer = _program(np.append(np.zeros(E), -1.0), margins, -payoffs[strategy], (None, None))
     if answer.status != 0:
         return ""
     shares = _distribution(answer.x[:E])
@@ -58,28 +53,22 @@ def safest_mixture(failure_rates: FloatArray) -> FloatArray:
     mixture, the result is the first such ego.
     """
     E, N = failure_rates.shape
-    worst = failure_rates.max(axis=1)
-    rates, ones = failure_rates.T, np.ones((N, 1))
-    simplex = {"A_eq": np.append(np.ones(E), 0.0)[None], "b_eq": [1.0]}
-    least = scipy.optimize.linprog(
-        np.append(np.zeros(E), 1.0),
-        A_ub=np.hstack([rates, -ones]),
-        b_ub=np.zeros(N),
-        bounds=[(0.0, 1.0)] * E + [(0.0, 1.0)],
-        **simplex,
-    )
-    best_pure = np.lexsort((failure_rates.mean(axis=1), worst))[0]
-    pure = np.eye(E)[best_pure]
+    means, worst = failure_rates.mean(axis=1), failure_rates.max(axis=1)
+    above_v = np.hstack([failure_rates.T, -np.ones((N, 1))])
+    least = _program(np.append(np.zeros(E), 1.0), above_v, np.zeros(N), (0.0, 1.0))
+    best_pure = np.lexsort((means, worst))[0]
     if least.status != 0 or worst[best_pure] <= least.fun + MARGIN:
-        return pure
-    mean = scipy.optimize.linprog(
-        np.append(failure_rates.mean(axis=1), 0.0),
-        A_ub=np.hstack([rates, -ones]),
-        b_ub=np.zeros(N),
-        bounds=[(0.0, 1.0)] * E + [(0.0, least.fun + MARGIN)],
-        **simplex,
-    )
+        return np.eye(E)[best_pure]
+    mean = _program(np.append(means, 0.0), above_v, np.zeros(N), (0.0, least.fun + MARGIN))
     return _distribution((mean if mean.status == 0 else least).x[:E])
+
+
+def _program(cost: FloatArray, rows: FloatArray, most: FloatArray, last: tuple[float | None, float | None]) -> Any:
+    """The solution of least cost: shares, whose sum is 1, and a number within the bounds `last`; rows @ x <= most."""
+    shares = len(cost) - 1
+    simplex = np.append(np.ones(shares), 0.0)[None]
+    bounds = [(0.0, 1.0)] * shares + [last]
+    return scipy.optimize.linprog(cost, A_ub=rows, b_ub=most, A_eq=simplex, b_eq=[1.0], bounds=bounds)
 
 
 def _distribution(shares: FloatArray) -> FloatArray:

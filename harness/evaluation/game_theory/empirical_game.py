@@ -42,9 +42,9 @@ class _Game:
 
     egos: list[str]
     non_egos: list[str]
-    failure_rates: FloatArray
-    ego_payoffs: FloatArray
-    non_ego_payoffs: FloatArray
+    failure_rate: FloatArray
+    ego_payoff: FloatArray
+    non_ego_payoff: FloatArray
 
 
 def equilibria(crossplay: pd.DataFrame) -> pd.DataFrame:
@@ -78,21 +78,17 @@ def _game(found: pd.DataFrame, asked: pd.Series, needed: Sequence[str]) -> tuple
     there &= complete.any()
     part = {name: table.loc[complete, there].to_numpy(float) for name, table in tables.items()}
     left_out = [("ego", name) for name in egos[~complete]] + [("non_ego", name) for name in non_egos[~there]]
-    game = _Game(
-        egos=egos[complete].tolist(),
-        non_egos=non_egos[there].tolist(),
-        failure_rates=part["failure_rate"],
-        ego_payoffs=part["ego_payoff"],
-        non_ego_payoffs=part["non_ego_payoff"],
-    )
+    game = _Game(egos=egos[complete].tolist(), non_egos=non_egos[there].tolist(), **part)
     return game, [{"solution": SolutionKind.NOT_PLAYED.value, "role": role, "player": name} for role, name in left_out]
 
 
 def _nash(game: _Game) -> Iterator[dict[str, Any]]:
     if not game.egos:
         return
-    strategies = _strategies(game)
-    found = solve(game.ego_payoffs, game.non_ego_payoffs)
+    non_egos = zip(game.non_egos, dominated(game.non_ego_payoff.T, game.non_egos), strict=True)
+    strategies = _egos(game)
+    strategies += [{"role": "non_ego", "player": name, "dominated_in_payoff": payoff} for name, payoff in non_egos]
+    found = solve(game.ego_payoff, game.non_ego_payoff)
     for number, each in enumerate(found, 1):
         for strategy, cells in zip(strategies, _played(game, each), strict=True):
             yield strategy | cells | {"solution": SolutionKind.NASH.value, "number": number}
@@ -100,16 +96,8 @@ def _nash(game: _Game) -> Iterator[dict[str, Any]]:
         yield from (strategy | {"solution": SolutionKind.NOT_VERIFIED.value} for strategy in strategies)
 
 
-def _strategies(game: _Game) -> list[dict[str, object]]:
-    """A row for each ego and non-ego of a game of two players, with the cells that are the same in every solution."""
-    non_egos = zip(game.non_egos, dominated(game.non_ego_payoffs.T, game.non_egos), strict=True)
-    rows = _egos(game)
-    rows += [{"role": "non_ego", "player": name, "dominated_in_payoff": payoff} for name, payoff in non_egos]
-    return rows
-
-
 def _egos(game: _Game) -> list[dict[str, object]]:
-    in_payoff, in_failures = (dominated(each, game.egos) for each in (game.ego_payoffs, -game.failure_rates))
+    in_payoff, in_failures = (dominated(each, game.egos) for each in (game.ego_payoff, -game.failure_rate))
     return [
         {"role": "ego", "player": name, "dominated_in_payoff": payoff, "dominated_in_failures": failures}
         for name, payoff, failures in zip(game.egos, in_payoff, in_failures, strict=True)
@@ -119,10 +107,10 @@ def _egos(game: _Game) -> list[dict[str, object]]:
 def _played(game: _Game, at: Equilibrium) -> Iterator[dict[str, float]]:
     """The cells of each ego, then of each non-ego, in an equilibrium."""
     x, y = at.ego_shares, at.non_ego_shares
-    ego_regret, non_ego_regret = regrets(game.ego_payoffs, game.non_ego_payoffs, at)
+    ego_regret, non_ego_regret = regrets(game.ego_payoff, game.non_ego_payoff, at)
     for shares, payoffs, failures, regret in (
-        (x, game.ego_payoffs @ y, game.failure_rates @ y, ego_regret),
-        (y, x @ game.non_ego_payoffs, x @ game.failure_rates, non_ego_regret),
+        (x, game.ego_payoff @ y, game.failure_rate @ y, ego_regret),
+        (y, x @ game.non_ego_payoff, x @ game.failure_rate, non_ego_regret),
     ):
         for share, payoff, failure_rate in zip(shares, payoffs, failures, strict=True):
             yield {
@@ -131,17 +119,17 @@ def _played(game: _Game, at: Equilibrium) -> Iterator[dict[str, float]]:
                 "solution_payoff": float(shares @ payoffs),
                 "regret": regret,
                 "failure_rate": failure_rate,
-                "solution_failure_rate": float(x @ game.failure_rates @ y),
+                "solution_failure_rate": float(x @ game.failure_rate @ y),
             }
 
 
 def _safest(game: _Game) -> Iterator[dict[str, object]]:
     if not game.egos:
         return
-    shares = safest_mixture(game.failure_rates)
-    against = shares @ game.failure_rates
+    shares = safest_mixture(game.failure_rate)
+    against = shares @ game.failure_rate
     kind = {"solution": SolutionKind.SAFEST.value, "solution_failure_rate": float(against.max())}
-    for row, share, rates in zip(_egos(game), shares, game.failure_rates, strict=True):
+    for row, share, rates in zip(_egos(game), shares, game.failure_rate, strict=True):
         yield kind | row | {"share": share, "failure_rate": rates.max()}
     for name, rate in zip(game.non_egos, against, strict=True):
         yield kind | {"role": "non_ego", "player": name, "failure_rate": rate}

@@ -10,9 +10,8 @@ import pandas as pd
 from harness.evaluation.comparisons.comparison import games_by_arm
 from harness.evaluation.competence import gate
 from harness.evaluation.game_theory.best_response_gap import Response, gaps
-from harness.evaluation.game_theory.crossplay import Pairing, crossplay
+from harness.evaluation.game_theory.crossplay import Pairing, crossplay, generalisation
 from harness.evaluation.game_theory.empirical_game import equilibria
-from harness.evaluation.game_theory.generalisation import generalisation
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +47,7 @@ def find(
         return None
     games = games_by_arm(episodes)
     bounds = dict.fromkeys((each.seed, bound) for each in pairings for bound in each.alone)
-    reasons = [(seed, gate([bound], seed, games).reason) for seed, bound in bounds]
+    reasons = [(seed, gate([bound], seed, games)["reason"]) for seed, bound in bounds]
     cells = crossplay(pairings, episodes)
     return GameFindings(
         gaps=gaps(responses, episodes, significance),

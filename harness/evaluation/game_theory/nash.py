@@ -105,7 +105,8 @@ def solve(ego_payoffs: FloatArray, non_ego_payoffs: FloatArray) -> list[Equilibr
             if candidate is not None and max(regrets(*game, candidate)) <= TOLERANCE + 2 * LP_ACCURACY:
                 found.setdefault(_rounded(candidate).tobytes(), candidate)
 
-    add_verified(_pure(reduced[0].shape))
+    R, C = reduced[0].shape
+    add_verified((np.eye(R)[row], np.eye(C)[column]) for row, column in np.ndindex(R, C))
     if few:
         add_verified(_by_supports(*reduced))
         add_verified(_by_vertices(*reduced))
@@ -156,12 +157,6 @@ def _of_all_strategies(
     return Equilibrium(ego_shares=sides[0], non_ego_shares=sides[1])
 
 
-def _pure(shape: tuple[int, ...]) -> Iterator[tuple[FloatArray, FloatArray]]:
-    for row in range(shape[0]):
-        for column in range(shape[1]):
-            yield np.eye(shape[0])[row], np.eye(shape[1])[column]
-
-
 def _by_supports(ego_payoffs: FloatArray, non_ego_payoffs: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
     from nashpy.algorithms.support_enumeration import support_enumeration
 
@@ -205,16 +200,14 @@ def _by_integer_program(
     ):
         unplayed, regret = np.zeros((count, size)), np.zeros((count, size))
         unplayed[:, own], unplayed[:, chosen] = np.eye(count), -np.eye(count)
-        constraints.append(
-            scipy.optimize.LinearConstraint(unplayed, -np.inf, 0.0)
-        )  # a share only where it may be played
+        # a share only where it may be played
+        constraints.append(scipy.optimize.LinearConstraint(unplayed, -np.inf, 0.0))
         regret[:, other], regret[:, value] = -payoffs, 1.0
         constraints.append(scipy.optimize.LinearConstraint(regret, 0.0, np.inf))  # nothing earns more than the value
         bounded = regret.copy()
         bounded[:, chosen] = np.eye(count)
-        constraints.append(
-            scipy.optimize.LinearConstraint(bounded, -np.inf, 1.0 + SLACK)
-        )  # what may be played earns it
+        # what may be played earns it
+        constraints.append(scipy.optimize.LinearConstraint(bounded, -np.inf, 1.0 + SLACK))
     objective = np.zeros(size)
     objective[v] = -1.0
     integral = np.zeros(size)

@@ -1,4 +1,5 @@
-"""The cause of one failure of the ego: chosen among what the rules find in the game.
+"""The cause of one failure of the ego, chosen among what the rules find in the game; and the causes of many failures in
+words.
 
 The rules, in order:
 
@@ -18,10 +19,11 @@ The rules, in order:
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from harness.evaluation.rule_book import thresholds as at
 from harness.evaluation.rule_book.course import Course
@@ -33,23 +35,21 @@ from harness.game.outcome import Outcome
 from harness.game.roles import EGO
 
 NO_REACTION = "no reaction"
+_WORDS = {
+    "cut_in": "cut-in",
+    "oncoming": "oncoming",
+    "cross": "crosses the way",
+    "ahead": "goes on ahead",
+    "stands": "stands ahead",
+    "from_behind": "hits from behind",
+    "changes_lane": "the ego changes lane",
+    "leaves_lane": "the ego leaves its lane",
+    "leaves_road": "the ego leaves the road",
+    "late": "the ego is late",
+}
+MOST_LINES = 3
+"""Kinds of causes in a summary; the rest is counted."""
 _SAY_IT_ALL = ("turns_across", "wrong_way")  # of the rules that are broken
-
-
-@dataclass(frozen=True, kw_only=True)
-class Cause:
-    """Why the ego failed in one game: cells of `causes.csv`."""
-
-    event: str
-    deed: str
-    time_s: float
-    reaction: str
-    braking_mps2: float
-    other: str = ""
-    time_left_s: float = 0.0
-    ego_saw: str = ""
-    hidden_until_s: float = math.nan
-    ego_broke: str = ""
 
 
 class _Event(NamedTuple):
@@ -60,8 +60,9 @@ class _Event(NamedTuple):
     words: str
 
 
-def cause_of(course: Course) -> Cause | None:
-    """The cause of the ego's failure in a game; None if there is no ego, or it reached its goal."""
+def cause_of(course: Course) -> dict[str, Any] | None:
+    """The cause of the ego's failure in a game, as cells of `causes.csv`; None if there is no ego, or it reached its
+    goal."""
     last = course.game.last_step(EGO)
     if last is None or course.game.outcomes[EGO] in (Outcome.GOAL, Outcome.RUNNING):
         return None
@@ -79,30 +80,29 @@ def cause_of(course: Course) -> Cause | None:
         event = _Event(event.step, name, words if name in _SAY_IT_ALL else f"{words} and {event.words}")
     seen = _seen(course, other, event.step, last)
     reaction, braking_mps2 = _reaction(course, event.step, last)
-    return Cause(
-        other=course.game.names[other],
-        event=event.name,
-        deed=_subject(course, other) + event.words,
-        time_s=round(event.step * course.step_s, 6),
-        time_left_s=round((last - event.step) * course.step_s, 6),
-        ego_saw="yes" if seen.any() else "no",
-        hidden_until_s=_hidden_until_s(course, other, event.step, last),
-        reaction=reaction,
-        braking_mps2=braking_mps2,
-        ego_broke=broke[EGO][1],
+    return {
+        "other": course.game.names[other],
+        "event": event.name,
+        "deed": _subject(course, other) + event.words,
+        "time_s": round(event.step * course.step_s, 6),
+        "time_left_s": round((last - event.step) * course.step_s, 6),
+        "ego_saw": "yes" if seen.any() else "no",
+        "hidden_until_s": _hidden_until_s(course, other, event.step, last),
+        "reaction": reaction,
+        "braking_mps2": braking_mps2,
+        "ego_broke": broke[EGO][1],
+    }
+
+
+def _of_the_ego_alone(course: Course, last: int) -> dict[str, Any]:
+    event, deed = (
+        ("late", "the ego does not reach its goal in time")
+        if course.game.outcomes[EGO] is Outcome.TIMEOUT
+        else ("leaves_road", "the ego leaves the road with no road user near")
     )
-
-
-def _of_the_ego_alone(course: Course, last: int) -> Cause:
-    timeout = course.game.outcomes[EGO] is Outcome.TIMEOUT
     reaction, braking_mps2 = _reaction(course, last, last)
-    return Cause(
-        event="late" if timeout else "leaves_road",
-        deed="the ego does not reach its goal in time" if timeout else "the ego leaves the road with no road user near",
-        time_s=round(last * course.step_s, 6),
-        reaction=reaction,
-        braking_mps2=braking_mps2,
-    )
+    span = {"time_s": round(last * course.step_s, 6), "time_left_s": 0.0}
+    return span | {"event": event, "deed": deed, "reaction": reaction, "braking_mps2": braking_mps2}
 
 
 def _subject(course: Course, other: int) -> str:
@@ -201,3 +201,68 @@ def _hidden_until_s(course: Course, other: int, begin: int, last: int) -> float:
         return math.nan
     free = np.flatnonzero(~hidden)
     return round((len(hidden) - 1 - int(free[0])) * course.step_s, 6) if len(free) else 0.0
+
+
+# --- in words ---
+
+
+def event_words(event: str) -> str:
+    """The name of a manoeuvre or of another event as text."""
+    return _WORDS.get(event, event.replace("_", " "))
+
+
+def causes_in_words(causes: pd.DataFrame) -> Mapping[tuple[str, int, int], str]:
+    """Event and response of every failure, such as "drift in -> swerves", by arm, seed and episode."""
+    rows = causes.itertuples()
+    return {(row.arm, row.seed, row.episode): f"{event_words(row.event)} -> {row.reaction}" for row in rows}
+
+
+def cause_lines(causes: pd.DataFrame, most: int = MOST_LINES) -> list[str]:
+    """The causes in rows of `causes.csv`, alike ones as one line, the most frequent first; empty without rows.
+
+    E.g. "24 of 30: cuts in from the left, 0.4 to 0.9 s before contact; the ego sees it, no reaction (braking up to 0.9
+    m/s²)".
+    """
+    kinds = causes.groupby(["ego_outcome", "deed", "ego_broke"], sort=False)
+    groups = sorted((rows for _, rows in kinds), key=lambda rows: -len(rows))
+    lines = [f"{len(rows)} of {len(causes)}: {kind_in_words(rows)}" for rows in groups[:most]]
+    rest = sum(len(rows) for rows in groups[most:])
+    return [*lines, f"{rest} of {len(causes)}: other causes"] if rest else lines
+
+
+def kind_in_words(rows: pd.DataFrame) -> str:
+    """Rows with the same cause in words: what the other did, how long that left, and what the ego saw and did."""
+    first: Any = rows.iloc[0]
+    if not first["other"]:
+        return str(first["deed"])
+    end = "contact" if first["ego_outcome"] == "collision" else "the ego leaves the road"
+    parts = [f"{first['deed']}, {_span(rows['time_left_s'].tolist())} s before {end}"]
+    hidden = rows["hidden_until_s"].dropna().tolist()
+    if hidden:
+        among = f" (in {len(hidden)})" if len(hidden) < len(rows) else ""
+        parts.append(f"hidden from the ego until {_span(hidden)} s before{among}")
+    if first["ego_broke"]:
+        parts.append(f"the ego {first['ego_broke']}")
+    braking = f"braking up to {rows['braking_mps2'].max():.1f} m/s²"
+    return "; ".join([*parts, f"{_sight(rows)}{_reactions(rows)} ({braking})"])
+
+
+def _sight(rows: pd.DataFrame) -> str:
+    seen = int((rows["ego_saw"] == "yes").sum())
+    if seen == len(rows):
+        return "the ego sees it"
+    return f"the ego sees it in {seen}" if seen else "the ego does not see it"
+
+
+def _reactions(rows: pd.DataFrame) -> str:
+    """The ego's reactions: the most frequent first, each with its number if there are several."""
+    counts = rows["reaction"].value_counts()
+    if len(counts) > 1:
+        return ": " + ", ".join(f"{reaction} in {count}" for reaction, count in counts.items())
+    reaction = str(counts.index[0])
+    return f", {reaction}" if reaction == NO_REACTION else f" and {reaction}"
+
+
+def _span(seconds: Sequence[float]) -> str:
+    low, high = (f"{value:.1f}" for value in (min(seconds), max(seconds)))
+    return low if low == high else f"{low} to {high}"

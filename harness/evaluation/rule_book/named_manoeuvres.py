@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from operator import itemgetter
+from typing import Any
 
 import numpy as np
 
@@ -18,19 +20,6 @@ from harness.evaluation.rule_book.course import SLACK, Course, Span, runs
 from harness.evaluation.rule_book.lane_entries import ENTRIES, entries
 from harness.game.arrays import BoolArray
 from harness.game.junctions import Control, Signal
-
-
-@dataclass(frozen=True, kw_only=True)
-class Manoeuvre:
-    """A manoeuvre of a player, from `time_s` until `until_s`; gap and time to collision are NaN where there is none."""
-
-    player: str
-    manoeuvre: str
-    time_s: float
-    until_s: float
-    gap_m: float
-    ttc_s: float
-    text: str
 
 
 def hard_brakes(course: Course, player: int) -> Iterator[Span]:
@@ -236,25 +225,24 @@ _RULES: Mapping[str, Callable[[Course, int], Iterator[Span]]] = {
 NAMES = (*ENTRIES, "overtake", *_RULES)
 
 
-def find_manoeuvres(course: Course) -> list[Manoeuvre]:
-    """The manoeuvres of the players in one game, by the time they begin. In a game with an ego they end with the ego's
-    game."""
-    digits = 6  # of a second: no rounding error in a multiple of the step
+def find_manoeuvres(course: Course) -> list[dict[str, Any]]:
+    """The manoeuvres of the players in one game, as cells of `manoeuvres.csv`, by the time they begin; gap and time to
+    collision are NaN where there is none. In a game with an ego they end with the ego's game."""
     found = [
-        Manoeuvre(
-            player=role,
-            manoeuvre=name,
-            time_s=round(span.first * course.step_s, digits),
-            until_s=round(span.last * course.step_s, digits),
-            gap_m=span.gap_m if math.isfinite(span.gap_m) else math.nan,
-            ttc_s=span.ttc_s if math.isfinite(span.ttc_s) else math.nan,
-            text=span.text,
-        )
+        {
+            "player": role,
+            "manoeuvre": name,
+            "time_s": round(span.first * course.step_s, 6),  # no rounding error in a multiple of the step
+            "until_s": round(span.last * course.step_s, 6),
+            "gap_m": span.gap_m if math.isfinite(span.gap_m) else math.nan,
+            "ttc_s": span.ttc_s if math.isfinite(span.ttc_s) else math.nan,
+            "text": span.text,
+        }
         for player, role in enumerate(course.game.world.roles)
         if course.drove[:, player].any()
         for name, span in _spans(course, player)
     ]
-    return sorted(found, key=lambda each: (each.time_s, each.player, each.manoeuvre))
+    return sorted(found, key=itemgetter("time_s", "player", "manoeuvre"))
 
 
 def _spans(course: Course, player: int) -> Iterator[tuple[str, Span]]:

@@ -134,12 +134,8 @@ def least_pet_s(drive: Drive) -> float:
 
 def least_share(drive: Drive) -> float:
     """The least of the measures of closeness, each over its limit; inf without any."""
-    ttc_s, headway_s = (min(each, default=math.inf) for each in (_ttc_s(drive), headways_s(drive)))
+    ttc_s, headway_s = (min(each, default=math.inf) for each in (drive.of("time_to_collision_s"), headways_s(drive)))
     return min(ttc_s / at.CONFLICT_TTC_S, least_pet_s(drive) / at.CONFLICT_PET_S, headway_s / at.CONFLICT_HEADWAY_S)
-
-
-def _ttc_s(drive: Drive) -> FloatArray:
-    return drive.of("time_to_collision_s")
 
 
 def _steps(drive: Drive) -> BoolArray:
@@ -207,7 +203,7 @@ def used_braking_mps2(drive: Drive) -> float | None:
     source=f"{_MINDERHOUD} ({_CRIME}: TET)",
 )
 def time_exposed_ttc_s(drive: Drive) -> float:
-    return float(np.count_nonzero(_ttc_s(drive) <= at.CONFLICT_TTC_S)) * drive.step_s
+    return float(np.count_nonzero(drive.of("time_to_collision_s") <= at.CONFLICT_TTC_S)) * drive.step_s
 
 
 @metric(
@@ -217,7 +213,7 @@ def time_exposed_ttc_s(drive: Drive) -> float:
     source=f"{_MINDERHOUD} ({_CRIME}: TIT)",
 )
 def time_integrated_ttc_s2(drive: Drive) -> float:
-    ttc_s = _ttc_s(drive)
+    ttc_s = drive.of("time_to_collision_s")
     return float((at.CONFLICT_TTC_S - ttc_s[ttc_s <= at.CONFLICT_TTC_S]).sum()) * drive.step_s
 
 

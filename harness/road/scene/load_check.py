@@ -15,7 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
-from harness.config.scene import scene_file
+from harness.config.scene import SCENE_FILE
 from harness.errors import Problem, SimulationError, UsageError
 from harness.road.demand.departures import background_departures
 from harness.road.demand.route_file import traveller_element
@@ -54,7 +54,7 @@ def check_loads(scene: OpenScene) -> None:
             _ = scene.warm_up
         except SimulationError as error:
             remedy = "correct the route file as SUMO's message says, or choose a shorter warm-up"
-            raise UsageError.of(scene_file(scene.folder), "warm_up_s", str(error), remedy) from None
+            raise UsageError.of(scene.folder / SCENE_FILE, "warm_up_s", str(error), remedy) from None
 
 
 def _write_vehicles(scene: OpenScene, file: Path) -> int:

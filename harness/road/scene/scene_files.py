@@ -10,7 +10,7 @@ from pathlib import Path
 from pydantic import ConfigDict
 from sumolib.net import Net
 
-from harness.config.scene import PlainFile, Scene, scene_file
+from harness.config.scene import SCENE_FILE, PlainFile, Scene
 from harness.config.toml_reading import Document, nearest, read_document
 from harness.errors import Problem, UsageError, collect
 from harness.files import leads_out
@@ -34,7 +34,7 @@ class SceneFiles:
     @property
     def file(self) -> Path:
         """The scene's document, which problems name."""
-        return scene_file(self.folder)
+        return self.folder / SCENE_FILE
 
 
 class NamedFiles(Document):
@@ -52,7 +52,7 @@ def read_scene(folder: Path, ego_type: str | None) -> SceneFiles:
     `ego_type` is a vehicle type of the route file that replaces the type of the ego's vehicle.
     """
     problems: list[Problem] = []
-    file = scene_file(folder)
+    file = folder / SCENE_FILE
     _check_within(file, folder)
     document = collect(problems, lambda: read_document(file, Scene))
     named = document or collect([], lambda: read_document(file, NamedFiles))

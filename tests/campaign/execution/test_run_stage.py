@@ -11,7 +11,7 @@ import pytest
 from harness.campaign.execution.run_stage import equilibrium_before
 from harness.campaign.plan.stages import EquilibriumGate, TrainingStage
 from harness.campaign.storage.run_folder import RunFolder
-from harness.evaluation.research_questions import AloneBound
+from harness.evaluation.competence import AloneBound
 from harness.evaluation.strategies import PersonaNonEgo
 from tests.support.game_tables import arm
 

@@ -12,7 +12,7 @@ import pytest
 import tests.support.tiny as tiny
 from harness.evaluation.people import judged_outcomes
 from harness.evaluation.tables import read_csv
-from harness.evaluation.trace_file import read_trace
+from harness.evaluation.trace_file import TraceReader
 from harness.evaluation.worst_first import FAILURES
 
 
@@ -33,7 +33,7 @@ def test_game__is_exported_with_every_step_of_its_trace(tmp_path: Path) -> None:
         "naive_alone-seed1-003.xosc",
         "scene.xodr",
     ]
-    trace = read_trace(run / "traces" / "naive_alone-seed1.parquet", 3)
+    trace = TraceReader().read(run / "traces" / "naive_alone-seed1.parquet", 3)
     root = ElementTree.parse(folder / "naive_alone-seed1-003.xosc").getroot()
     assert len(list(root.iter("Vertex"))) == len(trace)
     with (folder / "01_tracks.csv").open() as file:

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.evaluation.comparisons.comparison import compare, holm
-from harness.evaluation.research_questions import Question, Verdict
+from harness.evaluation.competence import Question, Verdict
 
 RQ1 = Question(question="RQ1", persona="speedy", seed=1, baseline="naive_alone", treatment="naive_vs_speedy")
 RQ2 = Question(question="RQ2", persona="speedy", seed=1, baseline="naive_vs_speedy", treatment="retrained_vs_speedy")

@@ -8,8 +8,8 @@ import pytest
 from scipy import stats
 
 from harness.evaluation.columns import TABLES
+from harness.evaluation.competence import AloneBound
 from harness.evaluation.game_theory.best_response_gap import GapVerdict, Response, gaps, nothing_to_gain
-from harness.evaluation.research_questions import AloneBound
 from tests.support.game_tables import arm, table
 
 EGO = Response(

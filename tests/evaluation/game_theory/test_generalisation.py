@@ -5,10 +5,9 @@ from dataclasses import replace
 
 import pytest
 
-from harness.evaluation.game_theory.crossplay import Pairing
+from harness.evaluation.competence import AloneBound, Verdict
+from harness.evaluation.game_theory.crossplay import Pairing, generalisation
 from harness.evaluation.game_theory.findings import find
-from harness.evaluation.game_theory.generalisation import generalisation
-from harness.evaluation.research_questions import AloneBound, Verdict
 from tests.support.game_tables import TRAINED_AGAINST, a_campaign, arm, findings, table
 
 NAIVE = Pairing(arm="naive_vs_distracted", seed=1, ego="naive", non_ego="distracted", persona="distracted")
