@@ -37,15 +37,12 @@ class Formats:
     csv: bool = False
 
 
-def check_formats(formats: Formats) -> None:
-    """Raise UsageError if a package that a format needs is not installed."""
+def check_export(folder: Path, formats: Formats) -> None:
+    """Raise UsageError unless the folder is new or empty, its parent is there, and the packages of the formats are
+    installed."""
     if formats.openscenario and find_spec("scenariogeneration") is None:
         message = "needs scenariogeneration, which is not installed"
         raise UsageError.of("--openscenario", "", message, "pip install 'safedriverl-harness[osc]'")
-
-
-def check_folder(folder: Path) -> None:
-    """Raise UsageError unless the folder is new or empty, and its parent is there."""
     if folder.is_symlink() or folder.exists():
         if not folder.is_dir():
             raise UsageError.of(folder, "", "is a file, not a folder", _NEW)
@@ -70,8 +67,7 @@ def write_games(
     can't be written, or a package is missing, and HarnessError if the net can't be converted; the folder is then as
     before.
     """
-    check_formats(formats)
-    check_folder(folder)
+    check_export(folder, formats)
     with _complete(folder) as partial:
         road = road_file(scene.net_file, title) if formats.opendrive else None
         courses = LaneCourses.read(scene.net_file) if formats.csv else None

@@ -397,7 +397,7 @@ def test_paper__a_distracted_drift_an_egos_swerve_and_the_rail(merge: OpenScene)
         assert played.recorded is not None
         cause = cause_of(Course(game=played.recorded))
         if cause is not None:
-            stories.add(f"{event_words(cause.event)} -> {cause.reaction} -> {played.record['ego_outcome']}")
+            stories.add(f"{event_words(cause['event'])} -> {cause['reaction']} -> {played.record['ego_outcome']}")
     assert "drift -> swerves -> rail" in stories
 
 

@@ -14,14 +14,13 @@ from harness.evaluation.people import judged, judged_outcomes
 from harness.evaluation.trace_file import TraceReader
 from harness.evaluation.worst_first import FAILURES, worst_first
 from harness.export.exported_game import ExportedGame, exported_game
-from harness.export.folder import Formats, check_folder, check_formats, write_games
+from harness.export.folder import Formats, check_export, write_games
 from harness.road.scene.open_scene import open_scene
 
 
 def export_game(run: Path, arm: str, episode: int, *, seed: int | None, folder: Path, formats: Formats) -> None:
     """Export one game. Raises UsageError if there is no such game or trace, or the folder can't be used."""
-    check_formats(formats)
-    check_folder(folder)
+    check_export(folder, formats)
     game = played_game(run, arm, episode, seed)
     write_games(iter([_exported(game)]), game.scene, folder, formats, title=RunFolder(run).manifest()["name"])
 
@@ -34,8 +33,7 @@ def export_failures(
 
     Raises UsageError if there is none, its traces are missing, or the folder can't be used.
     """
-    check_formats(formats)
-    check_folder(folder)
+    check_export(folder, formats)
     source = RunFolder(run)
     episodes = games_of(run, episodes_of(source), arm, seed)
     failures = worst_first(episodes[judged_outcomes(episodes).isin(FAILURES)])

@@ -18,7 +18,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from operator import attrgetter
 from typing import Any, Literal
 
 import numpy as np
@@ -69,11 +68,6 @@ class Check:
     def passed(self) -> bool:
         """Whether the bound is kept."""
         return self.measured and self.limit <= self.allowed
-
-    @property
-    def excess(self) -> float:
-        """By how much the limit is above the bound; infinite where it could not be measured."""
-        return self.limit - self.allowed if self.measured else np.inf
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,11 +128,12 @@ def judge(
 
 
 def worst_of_each(checks: Sequence[Check]) -> list[Check]:
-    """For each bound and persona the check with the largest excess, in the order of the checks."""
+    """For each bound and persona the check whose limit is farthest above the bound, or that could not be measured, in
+    the order of the checks."""
     groups: dict[tuple[str, str], list[Check]] = {}
     for check in checks:
         groups.setdefault((check.bound, check.persona), []).append(check)
-    return [max(group, key=attrgetter("excess")) for group in groups.values()]
+    return [max(group, key=lambda check: check.limit if check.measured else np.inf) for group in groups.values()]
 
 
 def judged_ego(judged: JudgedEgo, persona: str, seed: int, evidence: Evidence) -> EgoStrategy:

@@ -105,8 +105,7 @@ def solve(ego_payoffs: FloatArray, non_ego_payoffs: FloatArray) -> list[Equilibr
             if candidate is not None and max(regrets(*game, candidate)) <= TOLERANCE + 2 * LP_ACCURACY:
                 found.setdefault(_rounded(candidate).tobytes(), candidate)
 
-    R, C = reduced[0].shape
-    add_verified((np.eye(R)[row], np.eye(C)[column]) for row, column in np.ndindex(R, C))
+    add_verified(_pure(reduced[0].shape))
     if few:
         add_verified(_by_supports(*reduced))
         add_verified(_by_vertices(*reduced))
@@ -155,6 +154,11 @@ def _of_all_strategies(
         side[places] = clean / clean.sum()
         sides.append(side)
     return Equilibrium(ego_shares=sides[0], non_ego_shares=sides[1])
+
+
+def _pure(shape: tuple[int, ...]) -> Iterator[tuple[FloatArray, FloatArray]]:
+    for row, column in np.ndindex(shape):
+        yield np.eye(shape[0])[row], np.eye(shape[1])[column]
 
 
 def _by_supports(ego_payoffs: FloatArray, non_ego_payoffs: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
