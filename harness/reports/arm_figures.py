@@ -132,10 +132,7 @@ def spread_figure(columns: Sequence[ArmColumn], name: str, alternative: str) -> 
                 measured = values[np.isfinite(values)]
                 labels.append(f"{column.label}\nn = {len(measured)}")
                 if not len(measured):
-                    axes.annotate(
-                        "none", (place, 0), (0, 4), xycoords=("data", "axes fraction"),
-                        textcoords="offset points", ha="center", fontsize=8,
-                    )  # fmt: skip
+                    _note(axes, "none", place, 4, size_pt=8)
                     continue
                 low, median, high = np.quantile(measured, [0.25, 0.5, 0.75])
                 if len(measured) >= FEWEST_IN_A_BOX:
@@ -157,14 +154,16 @@ def _arms(figure: Figure, columns: Sequence[ArmColumn]) -> Axes:
     axes.set_xticks(range(len(columns)), [""] * len(columns))
     for place, column in enumerate(columns):  # only a text of one line has the same middle in any font
         for line, words in enumerate(column.label.split("\n")):
-            below = (0, -14 - 12 * line)
-            axes.annotate(
-                words, (place, 0), below, xycoords=("data", "axes fraction"),
-                textcoords="offset points", ha="center",
-            )  # fmt: skip
+            _note(axes, words, place, -14 - 12 * line, size_pt=10)
     axes.set_xlim(-0.55, len(columns) - 0.45)
     axes.tick_params(axis="x", length=0)
     return axes
+
+
+def _note(axes: Axes, words: str, place: int, above_pt: int, *, size_pt: int) -> None:
+    """Words at an arm's place, so far above the axis."""
+    at, offset, coordinates = (place, 0), (0, above_pt), ("data", "axes fraction")
+    axes.annotate(words, at, offset, coordinates, "offset points", ha="center", fontsize=size_pt)
 
 
 def _places(place: int, seeds: int) -> FloatArray:
@@ -186,8 +185,7 @@ def _points(axes: Axes, columns: Sequence[ArmColumn], names: str, text: Callable
             if len(column.rates) <= 2:
                 axes.annotate(text(value), (x, top), (0, 4), textcoords="offset points", ha="center", fontsize=9)
         if not column.rates:
-            axes.annotate(NOT_PLAYED, (place, 0), (0, 6), xycoords=("data", "axes fraction"),
-                          textcoords="offset points", ha="center", fontsize=9)  # fmt: skip
+            _note(axes, NOT_PLAYED, place, 6, size_pt=9)
 
 
 def _link(artists: Iterable[Artist], address: str) -> None:

@@ -113,10 +113,8 @@ def _map(quantity: _Quantity, crossplay: pd.DataFrame, label: str, place: int, w
     side by side."""
     personas = dict(zip(crossplay["non_ego"], crossplay["persona"], strict=True))
     order = list(dict.fromkeys(personas.values()))
-    egos, non_egos = (
-        list(dict.fromkeys(crossplay["ego"])),
-        sorted(personas, key=lambda each: order.index(personas[each])),
-    )
+    egos = list(dict.fromkeys(crossplay["ego"]))
+    non_egos = sorted(personas, key=lambda each: order.index(personas[each]))
     table = crossplay.pivot(index="ego", columns="non_ego", values=quantity.name)
     table = table.reindex(index=egos, columns=non_egos)
     title = f"{quantity.title}, {label}"

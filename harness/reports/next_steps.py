@@ -141,10 +141,8 @@ def _prevented(tables: RunTables) -> list[str]:
     all_avoided, all_failures = 0, 0
     for persona, arm in arms.items():
         judged = tables.prevented_in(arm)
-        avoided, failed = (
-            sum(each.row["from_start_prevented"] for each in judged),
-            sum(each.row["from_start_judged"] for each in judged),
-        )
+        avoided = sum(each.row["from_start_prevented"] for each in judged)
+        failed = sum(each.row["from_start_judged"] for each in judged)
         if failed and lines:
             lines.append(f"Against {persona}: {avoided} of {failed}.")
         elif failed:
