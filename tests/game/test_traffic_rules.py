@@ -303,6 +303,3 @@ def test_wrong_way__is_beyond_the_mark_to_the_oncoming_lanes(
     q = moment(world, [{"x_m": 60.0, "y_m": -1.6 + offset_m}, FAR])
     assert q.wrong_way[0].tolist() == [wrong, 0.0]
     assert value_of(q, "wrong_way", None) == pytest.approx(-0.1 * wrong)
-
-
-# --- time since a signal changed -------------------------------------------------------------------------------------
