@@ -211,7 +211,6 @@ def _resolved(document: Any, node: Any) -> Any:
 
 
 def _bounds(node: Any) -> str:
-    """The bounds of a schema, in words."""
     if "enum" in node:
         return f"one of {', '.join(map(toml, node['enum']))}"
     if "prefixItems" in node:  # an interval has two entries

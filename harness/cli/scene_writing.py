@@ -82,7 +82,6 @@ def write_scenes(opened: OpenMap, chosen: dict[str, GamePlan], out: Path) -> tup
 
 
 def _checked(opened: OpenMap, name: str, plan: GamePlan, folder: Path) -> Path:
-    """The folder of a scene, which is in order, in a folder."""
     scene = folder / name
     scene.mkdir()
     is_part = write_part(opened.net, opened.net_file, plan.edges, scene / f"{name}.net.xml")

@@ -27,7 +27,6 @@ USUAL_SIZE_M = {
 
 
 def _as_range(value: Any) -> Any:
-    """A number as a range without extent."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         return value, value
     return tuple(value) if isinstance(value, list) else value

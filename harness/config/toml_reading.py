@@ -168,7 +168,6 @@ def _shown(value: Any) -> str:
 
 
 def _model_at(model: type[BaseModel], location: list[Any]) -> type[BaseModel] | None:
-    """The model of the table at a location; None where there is none."""
     table: Any = model
     for part in location:
         if isinstance(part, int) or not hasattr(table, "model_fields"):

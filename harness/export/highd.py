@@ -78,7 +78,6 @@ def highd_tables(game: ExportedGame, number: int, courses: LaneCourses) -> dict[
 
 
 def _tracks(users: list[Body], game: ExportedGame, courses: LaneCourses) -> pd.DataFrame:
-    """A row for each road user and frame, by road user."""
     left_m, _, right_m, top_m = courses.bounds_m
     parts = []
     for place, body in enumerate(users, start=1):

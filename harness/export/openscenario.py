@@ -119,7 +119,6 @@ def _start(body: Body) -> Iterator[Any]:
 
 
 def _events(body: Body, game: ExportedGame) -> Iterator[xosc.Event]:
-    """The events of a body: it appears, follows its course, and is deleted."""
     begin_s, last_s = float(body.time_s[0]), float(body.time_s[-1])
     appears, follows = body.first_step > 0, body.moves and len(body.time_s) > 1
     if appears or follows:
@@ -161,7 +160,6 @@ def _signal_events(game: ExportedGame, road: RoadFile) -> Iterator[xosc.Event]:
 
 
 def _signal_controllers(game: ExportedGame, road: RoadFile) -> Iterator[xosc.TrafficSignalController]:
-    """A controller for each light, with the same states as phases."""
     for light, changes in game.signals.items():
         numbers = road.signals.get(light, {})
         controller = xosc.TrafficSignalController(light)

@@ -155,7 +155,6 @@ def judged_ego(judged: JudgedEgo, persona: str, seed: int, evidence: Evidence) -
 
 
 def _measured(bound: str, subject: Subject, evidence: Evidence) -> Iterator[Measured]:
-    """A bound in each arm of a subject."""
     match bound:
         case "failure_rate_alone":
             yield _rate("failure_rate", Arm(ego=subject.ego).name, subject.seed, evidence)
@@ -185,7 +184,6 @@ def _arms_against(subject: Subject, evidence: Evidence) -> list[str]:
 
 
 def _rate(column: str, arm: str, seed: int, evidence: Evidence) -> Measured:
-    """A rate of summary.csv, with the upper end of its interval."""
     row = evidence.rows.get((arm, seed))
     if row is None:
         return arm, np.nan, np.nan, 0

@@ -246,7 +246,6 @@ def find_manoeuvres(course: Course) -> list[dict[str, Any]]:
 
 
 def _spans(course: Course, player: int) -> Iterator[tuple[str, Span]]:
-    """The manoeuvres of a player, each with its name."""
     roles = course.game.world.roles
     for other in range(len(roles)):
         if other != player and course.drove[:, other].any():
