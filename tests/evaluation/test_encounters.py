@@ -193,15 +193,19 @@ def slowing(to_mps: float) -> FloatArray:
     return np.interp(np.arange(STEPS) * 0.1, [0.0, 1.8, 2.0, 2.2, 3.0], [10.0, 10.0, to_mps, to_mps, 10.0])
 
 
-@pytest.mark.parametrize(("least_mps", "names"), [(0.4, []), (0.6, ["rolls_through"])])
-@pytest.mark.parametrize("control", [Control.STOP, Control.ALL_WAY_STOP])
-def test_rolls_through__a_stop_sign(merge: OpenScene, control: Control, least_mps: float, names: list[str]) -> None:
+@pytest.mark.parametrize(
+    ("control", "least_mps", "names"),
+    [
+        (Control.STOP, 0.4, []),
+        (Control.STOP, 0.6, ["rolls_through"]),
+        (Control.ALL_WAY_STOP, 0.4, []),
+        (Control.ALL_WAY_STOP, 0.6, ["rolls_through"]),
+        (Control.GIVE_WAY, 10.0, []),
+    ],
+)
+def test_rolls_through__a_stop_sign(control: Control, least_mps: float, names: list[str], merge: OpenScene) -> None:
     found = named(lines(merge, control), ego(speed_mps=slowing(least_mps)))
     assert [each["manoeuvre"] for each in found] == names
-
-
-def test_rolls_through__no_other_line(merge: OpenScene) -> None:
-    assert named(lines(merge, Control.GIVE_WAY), ego()) == []
 
 
 @pytest.mark.parametrize(("speed_mps", "seconds"), [(10.0, 2.0), (25.0, 0.8)])

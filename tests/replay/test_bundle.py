@@ -93,13 +93,9 @@ def test_replay__is_of_one_game(merge_net: Path, tmp_path: Path) -> None:
 def test_title__calls_the_players_by_their_names(merge_net: Path, tmp_path: Path) -> None:
     names = names_in_pictures("red_light_runner")
     folder = write(clean_game(), merge_net, tmp_path / "replay", title="naive", names=names)
-    assert title_of(folder) == "naive   blue: ego, orange: red light runner"
+    title = ElementTree.parse(folder / "scene.add.xml").getroot().find("poi[@id='title']")
+    assert title.get("type") == "naive   blue: ego, orange: red light runner"
     assert names_in_pictures("") == {}
-
-
-def title_of(folder: Path) -> str:
-    poi = ElementTree.parse(folder / "scene.add.xml").getroot().find("poi[@id='title']")
-    return str(poi.get("type"))
 
 
 def test_scenery__types_that_occur_in_the_colours_of_the_game(merge_net: Path, tmp_path: Path) -> None:

@@ -53,22 +53,6 @@ def hundred(failures: int) -> list[int]:
     return [1] * failures + [0] * (100 - failures)
 
 
-@pytest.mark.parametrize(
-    ("failures", "bound", "passed"),
-    [
-        (0, 0.03, False),  # 0 of 100 shows no less than 3.6 %
-        (0, 0.04, True),
-        (7, 0.10, False),
-        (7, 0.14, True),
-    ],
-)
-def test_failure_rate__is_judged_by_the_upper_end_of_its_interval(failures: int, bound: float, passed: bool) -> None:
-    run = evidence({NAIVE_VS: hundred(30), RETRAINED_VS: hundred(failures)})
-    (check,) = judge({"failure_rate": bound}, "last", ["speedy"], [1], run)
-    assert (check.arm, check.games, check.value) == ("retrained_vs_speedy", 100, failures / 100)
-    assert check.passed is passed
-
-
 def test_bound__of_players_that_cannot_drive_the_scene_is_not_kept() -> None:
     run = evidence({NAIVE_VS: hundred(0), RETRAINED_VS: hundred(0)})
     asked = pd.DataFrame({"persona": ["speedy", "calm"], "seed": [1, 1], "reason": ["speedy can't drive it", ""]})
@@ -123,6 +107,8 @@ UNFAILING = replace(RUN, preventability=pd.DataFrame(columns=["arm", "seed", "dr
     ("run", "name", "bounds", "value", "limit", "games"),
     [
         # a bound that is not kept and one that is; the limit is the end of the interval that is judged
+        (RUN, "failure_rate", (0.03, 0.04), 0.0, 0.0362, 100),  # 0 of 100 shows no less than 3.6 %
+        (JUDGED, "failure_rate", (0.1, 0.14), 0.07, 0.1389, 100),
         (NEAR_MISSES, "near_miss_rate", (0.5, 0.99), 0.95, 0.9836, 100),
         (FORGOTTEN, "failure_rate_alone", (0.25, 0.3), 0.2, 0.2918, 100),
         (SLOW, "speed_loss_mps", (1.0, 2.0), 1.5, 1.5, 100),

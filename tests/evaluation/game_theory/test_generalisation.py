@@ -60,16 +60,12 @@ def test_generalisation__a_naive_ego_that_never_fails_has_no_share():
 # --- all four tables at once ---
 
 
-def test_find__returns_none_without_pairings_and_responses():
-    episodes, _, _ = a_campaign(games=4)
-    assert find([], [], {}, episodes, 0.01) is None
-
-
-def test_find__gives_every_table():
+def test_find__gives_every_table_or_none_without_pairings_and_responses():
     episodes, pairings, responses = a_campaign(seeds=(1, 2), games=20)
     found = find(pairings, responses, TRAINED_AGAINST, episodes, 0.01)
     assert (len(found.gaps), len(found.crossplay), len(found.generalisation)) == (8, 32, 6)
     assert set(found.equilibria["game"]) == {"speedy", "distracted", "all"}
+    assert find([], [], {}, episodes, 0.01) is None
 
 
 @pytest.mark.parametrize("incapable", ["naive", "retrained_speedy"])
