@@ -115,7 +115,7 @@ def update_side(timer: LapTimer, learner: str) -> None:
 
     with (
         _games_of(_FreeVecEnv),
-        patch("harness.training.ppo.CurveRecorder", lambda *_, **__: Repeated()),
+        patch("harness.training.ppo._CurveRecorder", lambda *_, **__: Repeated()),
         tempfile.TemporaryDirectory(prefix="benchmark-") as scratch,
     ):
         spec = training_spec(endless_training(learner=learner))

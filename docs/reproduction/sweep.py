@@ -26,6 +26,7 @@ from harness.campaign.execution.worker_pool import WorkerPool, cores
 from harness.campaign.preflight import open_campaign
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.toml_reading import Document, read_document
+from harness.shipped_documents import find_document
 
 COLUMNS = [
     *("persona", "key", "value", "arm", "episodes", "failure_rate", "mean_speed_mps"),
@@ -95,7 +96,10 @@ def _write_campaign(base: Path, sweep: Sweep, setting: Setting, folder: Path) ->
     source = base / sweep.campaign
     campaign = tomlkit.parse(source.read_text(encoding="utf-8"))
     ego: Any = campaign["ego"]
-    files = {"": (base / setting.lever.persona).resolve(), "ego": (source.parent / str(ego["persona"])).resolve()}
+    files = {
+        "": (base / setting.lever.persona).resolve(),
+        "ego": find_document(str(ego["persona"]), source.parent, "personas"),
+    }
     prefix, _, key = setting.lever.key.partition(".")
     changed = prefix if prefix in ("campaign", "ego") else ""
     for name, file in files.items():

@@ -128,7 +128,8 @@ def played(lights: OpenScene) -> Iterator[dict[str, FloatArray]]:
         while arena.state.running.any():
             step = arena.step()
             for name in names:
-                values = getattr(step.quantities, name)[:, EGO]
+                owner = step.quantities.rules if name == "permitted_mps" else step.quantities
+                values = getattr(owner, name)[:, EGO]
                 series[name].append(np.where(step.drove[:, EGO], values, np.nan))
         series["outcome"] = [arena.state.outcome[:, EGO].copy()]
         yield {name: np.array(values) for name, values in series.items()}

@@ -195,6 +195,13 @@ ON_ROAD = st.fixed_dictionaries(
         "speed_mps": st.floats(0.0, 30.0),
     }
 )
+
+
+def assume_no_ties(cars: list[dict[str, Any]]) -> None:
+    """A vehicle exactly ahead has no side, and one exactly beside is neither ahead nor behind."""
+    assume(all(min(np.diff(sorted(each[name] for each in cars))) > 0.01 for name in ("x_m", "y_m")))
+
+
 DRIVEN = st.builds(lambda body, wheel: {**body, "steering_rad": wheel}, ON_ROAD, st.floats(-0.5, 0.5))
 
 
@@ -215,8 +222,7 @@ def test_observation__does_not_depend_on_the_place_of_the_road(
     x0: float,
     y0: float,
 ) -> None:
-    sides = sorted(each["y_m"] for each in [*players, *others])
-    assume(min(np.diff(sides)) > 0.01)  # a vehicle exactly ahead has no side
+    assume_no_ties([*players, *others])
     here = road(merge.world, 0.0, 0.0, 0.0, 1.6, -4.8, [0.0, -3.2])
     there = road(merge.world, heading, x0, y0, 1.6, -4.8, [0.0, -3.2])
     one = observe(moment(here, players, others))
@@ -230,8 +236,7 @@ def test_observation__does_not_depend_on_the_place_of_the_road(
 def test_observation__of_the_mirror_image_is_the_mirror_image(
     moment: Moment, merge: OpenScene, players: list[dict[str, Any]], others: list[dict[str, Any]]
 ) -> None:
-    sides = sorted(each["y_m"] for each in [*players, *others])
-    assume(min(np.diff(sides)) > 0.01)  # a vehicle exactly ahead has no side
+    assume_no_ties([*players, *others])
     one = observe(moment(road(merge.world, 0.0, 0.0, 0.0, 1.6, -4.8, [0.0, -3.2]), players, others))
     image = road(merge.world, 0.0, 0.0, 0.0, 4.8, -1.6, [0.0, 3.2])
     two = observe(moment(image, [mirrored(each) for each in players], [mirrored(each) for each in others]))

@@ -328,15 +328,16 @@ def test_metric__is_a_number_or_unmeasured_at_every_place_of_every_route(
     metric: Metric, everywhere: Quantities
 ) -> None:
     for outcome in (Outcome.GOAL, Outcome.RAIL):
-        for game in (0, len(everywhere.state.step) - 1):
+        for place in (0, len(everywhere.state.step) - 1):
             drive: Any = SimpleNamespace(
                 outcome=outcome,
                 step_s=0.1,
-                steers=True,
+                player=0,
+                game=SimpleNamespace(steers=(True,)),
                 encounters=(),
                 payoff=np.zeros(1),
-                acceleration_mps2=everywhere.state.acceleration_mps2[game, :1],
-                of=lambda name, game=game: getattr(everywhere, name)[game, :1],
+                acceleration_mps2=everywhere.state.acceleration_mps2[place, :1],
+                of=lambda name, place=place: getattr(everywhere, name)[place, :1],
             )
             value = metric.of(drive)
             assert value is None or np.isfinite(value)

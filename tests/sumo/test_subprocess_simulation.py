@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -116,10 +117,10 @@ def test_crash__of_the_child_is_an_error_that_names_the_signal(far: SubprocessSi
 def test_interrupt__ends_the_child(far: SubprocessSimulation, monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as patched:
 
-        def interrupted(stream: Any) -> Any:
+        def interrupted(stream: Any, message: Any) -> None:
             raise KeyboardInterrupt
 
-        patched.setattr(subprocess_simulation, "_receive", interrupted)
+        patched.setattr(subprocess_simulation, "_send", interrupted)
         with pytest.raises(KeyboardInterrupt):
             far.reload(1)
     with pytest.raises(SimulationError, match="SIGKILL"):
@@ -145,6 +146,7 @@ def test_prints__of_sumo_do_not_enter_the_pipe() -> None:
 from harness.sumo import libsumo_simulation
 from harness.sumo import subprocess_simulation
 import os
+import pickle
 class Printing:
     def __init__(self, *arguments, **options): os.write(1, b"SUMO says"); print("this", flush=True)
     def reload(self, seed): os.write(1, b"and that"); return seed
@@ -162,8 +164,9 @@ subprocess_simulation.serve()
     assert child.stdin is not None
     assert child.stdout is not None
     for message, answer in (((None, 1, (True, True), 1, False), None), (("reload", 5), 5)):
-        subprocess_simulation._send(child.stdin, message)
-        assert subprocess_simulation._receive(child.stdout) == (answer, None)
+        child.stdin.write(pickle.dumps(message))
+        child.stdin.flush()
+        assert pickle.load(child.stdout) == (answer, None)
     rest, errors = child.communicate(timeout=300)
     assert (rest, errors.split()) == (b"", [b"SUMO", b"saysthis", b"and", b"thatbye"])
 

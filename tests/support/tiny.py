@@ -186,8 +186,9 @@ def numbers(run: Path) -> dict[str, bytes]:
 
 
 def carried_out(campaign: Path, run: Path, *options: object, **settings: Any) -> str:
-    """Carry a campaign out by the real command, which must succeed and complain of nothing; what it printed. It has one worker unless the
-    options say otherwise: each loads PyTorch, and tests run in as many processes as there are cores."""
+    """Carry a campaign out by the real command, which must succeed and complain of nothing; what it printed. It has one
+    worker unless the options say otherwise: each loads PyTorch, and tests run in as many processes as there are cores.
+    """
     jobs = () if "--jobs" in options else ("--jobs", 1)
     done = harness("campaign", campaign, "--out", run, *jobs, *options, **settings)
     assert done.returncode in (0, NOT_ACCEPTED), done.stdout + done.stderr
