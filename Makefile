@@ -28,7 +28,7 @@ campaign: install ## run the paper's campaign: harness campaign campaigns/merge.
 quick: install ## the same campaign with a budget of minutes: every stage, fewer steps
 	$(BIN)/harness campaign $(CAMPAIGN) --quick $(ARGS) || test $$? -eq 3
 
-test: install ## run every test, in about 27 minutes on two cores; `make test ARGS="-k payoff"` runs some
+test: install ## run every test, in about 15 minutes on two cores; `make test ARGS="-k payoff"` runs some
 	$(PYTEST) $(ARGS)
 
 test-esmini: install ## run the tests with esmini and its maps: make test-esmini ESMINI=/path/to/bin/esmini

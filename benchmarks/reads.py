@@ -23,7 +23,7 @@ from benchmarks.traffic import write_scene
 from harness.game.arrays import FloatArray
 from harness.game.state import NOTICED_M
 from harness.road.scene.open_scene import open_scene
-from harness.sumo.vehicle_reads import DIRECT, NearSearch, read_near, string_record
+from harness.sumo.vehicle_reads import NearSearch, read_near
 
 _STEPS = 60  # the players have not met any vehicle by then, and no vehicle has left
 _NEAREST = 17  # as many vehicles of a game as are near its players, of 50
@@ -38,20 +38,17 @@ class _Way:
     read: Callable[[list[str]], object] = lambda names: None
 
 
-def _read_as_arena(direct: bool) -> Callable[[list[str]], object]:
+def _read_as_arena() -> Callable[[list[str]], object]:
     """The reading of `BackgroundTraffic`, in which every vehicle counts as near."""
     prepared: list[Callable[[], object]] = []
-    texts: list[bytes] = []  # the records point to them
 
     def read(names: list[str]) -> object:
         if not prepared:  # the arena prepares a name once as well
-            texts.extend(name.encode() for name in names)
-            record = np.array([[string_record(text) for text in texts]], dtype=np.uint64)
             shape, no_player = (1, len(names)), np.zeros((1, 1))
             numbers = (np.zeros(shape, dtype=np.int64), np.ones(shape), np.ones(shape), np.zeros(1))
             search = NearSearch(*numbers, no_player, no_player, no_player > 0.0, 1.0, 0, 1.0, 1, True)
             named, due = np.array([names], dtype=object), np.arange(len(names))
-            prepared.append(partial(read_near, search, named, records=record, due=due, direct=direct))
+            prepared.append(partial(read_near, search, named, due))
         return prepared[0]()
 
     return read
@@ -69,8 +66,7 @@ def _subscribe_around_egos(names: list[str]) -> None:
 
 _ALONE = _Way(words="a step alone")
 _WAYS = (
-    _Way(words="three getters, called from Python", read=_read_as_arena(direct=False)),
-    _Way(words="the same C++ functions, called directly", read=_read_as_arena(direct=True)),
+    _Way(words="three getters", read=_read_as_arena()),
     _Way(words="subscriptions, results not fetched", prepare=_subscribe),
     _Way(
         words="subscriptions, results fetched at once",
@@ -95,7 +91,7 @@ def reads_table(laps: int, background: int = 50) -> str:
         try:
             coasting.reset_all()
             placements = record_placements(coasting, _STEPS, reset_ended=False)
-            ways = [_ALONE, *(way for way in _WAYS if DIRECT or way is not _WAYS[1])]
+            ways = [_ALONE, *_WAYS]
             seconds = {way.words: np.full((2, _STEPS - 1), np.inf) for way in ways}
             for _ in range(laps):
                 for way in ways:

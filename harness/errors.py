@@ -43,7 +43,8 @@ class Problem:
 
     def __str__(self) -> str:
         """One line of plain text: names in a document can't control a terminal or imitate another message."""
-        key, message, remedy = (_shortened(part) for part in (self.key, self.message, self.remedy))
+        parts = (self.key, self.message, self.remedy)
+        key, message, remedy = (each if len(each) <= _LONGEST else f"{each[:_LONGEST]} ..." for each in parts)
         where = f"{self.file}: {key}" if key else self.file
         return plain(f"{where}: {message}" + (f" ({remedy})" if remedy else ""))
 
@@ -55,10 +56,6 @@ def plain(text: str) -> str:
     return "".join(
         char if char.isprintable() else char.encode("unicode_escape", "surrogatepass").decode() for char in text
     )
-
-
-def _shortened(text: str) -> str:
-    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
 
 
 class UsageError(HarnessError):

@@ -11,6 +11,7 @@ import hashlib
 import os
 import stat
 import tempfile
+from collections.abc import Collection
 from pathlib import Path
 
 _SCRATCH = ".part"
@@ -98,6 +99,14 @@ def content_of(path: Path, most_bytes: int) -> bytes:
 def digest_of_file(path: Path) -> str:
     """SHA-256 of a plain file's content. Raises OSError as `content_of` does, and for more than 1 GB."""
     return hashlib.sha256(content_of(path, _MOST_HASHED_BYTES)).hexdigest()
+
+
+def has_digest(path: Path, digests: Collection[str]) -> bool:
+    """Whether a path is a plain file with one of these digests."""
+    try:
+        return digest_of_file(path) in digests
+    except OSError:
+        return False
 
 
 def leads_out(path: Path, folder: Path) -> bool:

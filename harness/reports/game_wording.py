@@ -67,13 +67,10 @@ def _label(verdicts: Sequence[GapVerdict], both: bool) -> str:
 
 def _both_sides(persona: str, ego: Row | None, non_ego: Row | None) -> str:
     driver = f"the {persona} driver"
-    if ego is not None and non_ego is not None and all(map(_gains_a_share, (ego, non_ego))):
+    gains = [each for each in (ego, non_ego) if each is not None and each["verdict"] == GapVerdict.DISTINGUISHABLE]
+    if non_ego is not None and [math.isfinite(each["gap_share"]) for each in gains] == [True, True]:
         return f"{_side('the ego', ego)}; {driver} {_share(non_ego)}"
     return f"{_side('the ego', ego)}; {_side(driver, non_ego)}"
-
-
-def _gains_a_share(row: Row) -> bool:
-    return GapVerdict(row["verdict"]) is GapVerdict.DISTINGUISHABLE and math.isfinite(row["gap_share"])
 
 
 def _induced_failures(row: Row) -> str:
@@ -148,7 +145,8 @@ def _of_pairs(persona: str, pairs: Sequence[Sequence[Row]]) -> Answer:
         f"in {count} of {several} {unit} {findings[label]}" for label, count in counts.items() if count
     )
     headline = next((label for label in (NO, NEAR, OPEN) if counts[label]), NOT_ANSWERED)
-    responders = [row for rows in pairs for row in rows if _is_measured_response(row)]
+    measured = [row for rows in pairs for row in rows if not row["reason"] and row["pairs"]]
+    responders = [row for row in measured if row["role"] == "non_ego"]
     return Answer(
         question=QUESTION,
         label=headline if headline in (OPEN, NOT_ANSWERED) else f"{headline} in {counts[headline]} of {several} {unit}",
@@ -157,10 +155,6 @@ def _of_pairs(persona: str, pairs: Sequence[Sequence[Row]]) -> Answer:
         speed=_induced_in_several(persona, responders, unit),
         per_seed=answers,
     )
-
-
-def _is_measured_response(row: Row) -> bool:
-    return not row["reason"] and row["role"] == "non_ego" and bool(row["pairs"])
 
 
 def _induced_in_several(persona: str, responders: Sequence[Row], unit: str) -> str:

@@ -23,7 +23,7 @@ from harness.road.xml.angles import heading_rad_of
 from harness.sumo.background_people import BackgroundPeople
 from harness.sumo.insertion import Insertion, put_beside
 from harness.sumo.simulation import Players, Reading, Tiles, reading_of, side_by_side
-from harness.sumo.vehicle_reads import DIRECT, NearSearch, read_near, string_record
+from harness.sumo.vehicle_reads import NearSearch, read_near
 
 _LONGEST_WAIT = 50  # steps
 _NEVER = -1
@@ -38,8 +38,6 @@ class _Table:
         self.count = [0] * games  # places taken
         self.due = np.full(shape, _NEVER)  # the step in which to read it; _NEVER while it is not in the traffic
         self.sumo_name = np.empty(shape, dtype=object)
-        self.sumo_text = np.empty(shape, dtype=object)  # the bytes of that name, which the records point to
-        self.sumo_record = np.zeros((*shape, 4), dtype=np.uint64)
         self.name = np.empty(shape, dtype=object)  # without the prefix of the tile
         self.kind = np.empty(shape, dtype=object)
         self.length_m = np.zeros(shape)
@@ -77,8 +75,6 @@ class BackgroundTraffic:
     ) -> None:
         self._tiles, self._insertion, self._recorded = tiles, insertion, recorded
         self._step_s, self._fastest_player_mps = step_s, fastest_player_mps
-        self.standing = 0
-        """Vehicles in SUMO that stand for obstacles."""
         self._step = 0
         games = len(tiles.prefixes)
         self._first_step = [0] * games
@@ -144,17 +140,11 @@ class BackgroundTraffic:
             *(self._fastest_player_mps, self._step, self._step_s),
             *(1 if self._recorded else _LONGEST_WAIT, self._recorded),
         )
-        direct = DIRECT and self._sumo_has_all(players)
-        places, motion = read_near(search, table.sumo_name, records=table.sumo_record, due=due, direct=direct)
+        places, motion = read_near(search, table.sumo_name, due)
         names = table.sumo_name.ravel()[places].tolist() if self._tiles.roads_m is not None else []
         points = map(_libsumo.vehicle_getPosition3D, names)
         near = self._tiles.on_level(points, places // table.due.shape[1])
         return self._reading(places[near], motion[:, near])
-
-    def _sumo_has_all(self, players: Players) -> bool:
-        """Whether SUMO has as many vehicles and persons as were inserted and have neither arrived nor been removed."""
-        others = np.count_nonzero(players[2]) + self.standing + len(self._people.inserted)
-        return _libsumo.simulation_getMinExpectedNumber() == len(self._places) + others
 
     def _reading(self, places: IntArray, motion: FloatArray) -> Reading:
         """The reading of vehicles at flat places [n] of the table; motion [4, n] is front x, y, SUMO's angle, speed."""
@@ -195,13 +185,10 @@ class BackgroundTraffic:
                 self._people.add(game, departure)
                 continue
             sumo_name, vehicle = self._tiles.prefixes[game] + departure.name, libsumo.vehicle
-            sumo_text = sumo_name.encode()
             self._insertion.depart(self._tiles.prefixes[game], sumo_name, departure)
             place = self._table.add(
                 game,
                 sumo_name=sumo_name,
-                sumo_text=sumo_text,
-                sumo_record=string_record(sumo_text),
                 name=departure.name,
                 kind=vehicle.getTypeID(sumo_name),
                 length_m=vehicle.getLength(sumo_name),

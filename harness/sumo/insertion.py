@@ -131,11 +131,6 @@ class StandingVehicles:
         self._scene, self._prefixes, self._insertion = scene, prefixes, insertion
         self._names: list[list[str]] = [[] for _ in prefixes]
 
-    @property
-    def count(self) -> int:
-        """Vehicles of all games."""
-        return sum(map(len, self._names))
-
     def reset(self, game: int, *parts: str | int) -> None:
         """Replace the vehicles of a game by those of the game whose seeds have these parts."""
         for name in self._names[game]:

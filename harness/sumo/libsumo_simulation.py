@@ -145,7 +145,6 @@ class LibsumoSimulation(Simulation):
             departures = clear_of_players(departures, start, self._scene.world.length_m)
             if self._standing is not None:
                 self._standing.reset(game, *start.parts)
-                self._background.standing = self._standing.count
                 departures = clear_of_obstacles(departures, self._scene.obstacles.boxes(*start.parts))
             background = self._background.reset(game, departures)
             if self._speed_limits is not None:

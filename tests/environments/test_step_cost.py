@@ -23,15 +23,12 @@ from harness.game.initial_state import draw_initial_state
 from harness.game.outcome import Outcome
 from harness.game.seeding import generator_of
 from harness.road.scene.open_scene import OpenScene
-from harness.sumo import background_traffic
-from harness.sumo.vehicle_reads import DIRECT
 from tests.support.repository import REPOSITORY
 from tests.support.scenes import build_scene
 
 PLACEMENTS_PER_GAME = 2  # moveToXY, with two players that the harness drives
 PER_STEP = {"simulationStep": 1, "simulation.getArrivedIDList": 1}
 PER_STEP_WITH_TRAFFIC = {"simulation.getDepartedIDList": 1}
-PER_STEP_WITH_DIRECT_READS = {"simulation.getMinExpectedNumber": 1}
 READS_PER_VEHICLE = ("getPosition", "getAngle", "getSpeed")
 READS_PER_FAR_VEHICLE = 0.2  # a step
 FEW, MANY = 4, 16  # games
@@ -130,22 +127,6 @@ def test_step__calls_sumo_for_placements_and_a_step_only(games: int, scenes: dic
     assert calls == expected | {"vehicle.moveToXY": PLACEMENTS_PER_GAME * games * STEPS}
 
 
-@pytest.mark.skipif(not DIRECT, reason="vehicles can't be read directly on this platform")
-def test_step__calls_no_function_per_vehicle_if_vehicles_are_read_directly(scenes: dict[str, OpenScene]) -> None:
-    with counting(scenes["busy"], FEW) as counted:
-        calls = counted.libsumo_calls(counted.steps)
-    of_steps = PER_STEP | PER_STEP_WITH_TRAFFIC | PER_STEP_WITH_DIRECT_READS
-    expected = {name: number * STEPS for name, number in of_steps.items()}
-    assert calls == expected | {"vehicle.moveToXY": PLACEMENTS_PER_GAME * FEW * STEPS}
-
-
-@pytest.fixture
-def through_python(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Vehicles are read through Python, whatever the platform allows."""
-    monkeypatch.setattr(background_traffic, "DIRECT", False)
-
-
-@pytest.mark.usefixtures("through_python")
 def test_step__reads_each_vehicle_near_a_player_once(scenes: dict[str, OpenScene]) -> None:
     with counting(scenes["busy"], FEW) as counted:
         calls = counted.libsumo_calls(counted.steps)
@@ -154,7 +135,6 @@ def test_step__reads_each_vehicle_near_a_player_once(scenes: dict[str, OpenScene
     assert calls == expected | {"vehicle.moveToXY": PLACEMENTS_PER_GAME * FEW * STEPS}
 
 
-@pytest.mark.usefixtures("through_python")
 def test_step__seldom_reads_vehicles_far_away(scenes: dict[str, OpenScene]) -> None:
     with counting(scenes["far"], FEW) as counted:
         calls = counted.libsumo_calls(counted.steps)
@@ -176,7 +156,6 @@ def test_step__a_finished_game_has_no_placements(scenes: dict[str, OpenScene]) -
             counted.arena.simulation.remove(0, player)
         calls = counted.libsumo_calls(counted.steps)
     assert calls["vehicle.moveToXY"] == PLACEMENTS_PER_GAME * (FEW - 1) * STEPS
-    assert not DIRECT or not any(calls[f"vehicle.{name}"] for name in READS_PER_VEHICLE)
 
 
 def test_reset__without_background_traffic_players_stay_in_sumo(scenes: dict[str, OpenScene]) -> None:

@@ -1,8 +1,7 @@
-"""Background vehicles: a reading is what SUMO has, read directly where the platform allows it and through Python."""
+"""Background vehicles: a reading is what SUMO has."""
 
 from __future__ import annotations
 
-import platform
 from contextlib import closing
 from pathlib import Path
 
@@ -15,10 +14,8 @@ from hypothesis import strategies as st
 from harness.errors import SimulationError
 from harness.game.state import NOTICED_M
 from harness.road.demand.route_file import Departure
-from harness.sumo import background_traffic
 from harness.sumo.libsumo_simulation import LibsumoSimulation
 from harness.sumo.simulation import distance_to_player_m, reading_of
-from harness.sumo.vehicle_reads import DIRECT
 from tests.support.scenes import LEFT_Y, build_scene, placed
 
 GAMES, STEPS, VAN_M = 3, 40, 6.0
@@ -31,18 +28,7 @@ def van(name: str, position_m: float, depart_s: float = 0.0) -> Departure:
     return Departure(name=name, vehicle_type="van", edges=("road",), depart_s=depart_s, **where)
 
 
-@pytest.fixture(params=[False, True], ids=["through_python", "directly"])
-def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The way of reading vehicles."""
-    monkeypatch.setattr(background_traffic, "DIRECT", request.param and DIRECT)
-
-
-def test_direct__is_available_on_linux_x86_64() -> None:
-    assert ((platform.system(), platform.machine()) == ("Linux", "x86_64")) == DIRECT
-
-
 @pytest.mark.parametrize("recorded", [False, True])
-@pytest.mark.usefixtures("way")
 def test_reading__is_what_sumo_has(tmp_path: Path, recorded: bool) -> None:
     """Of all vehicles in a recorded game, else of those near a player; the table of vehicles grows."""
     scene = build_scene(tmp_path, others=OTHERS)
@@ -68,9 +54,7 @@ def test_reading__is_what_sumo_has(tmp_path: Path, recorded: bool) -> None:
             assert all(recorded is False and name[3:] != "leaves" for name in found), "a margin of a vehicle's length"
 
 
-@pytest.mark.usefixtures("way")
 def test_reading__a_vehicle_that_sumo_has_lost_is_an_error(tmp_path: Path) -> None:
-    """Read directly, it would end the process."""
     scene = build_scene(tmp_path, others=OTHERS)
     with closing(LibsumoSimulation(scene, 1, (True, True), 1)) as simulation:
         start = placed(scene, (40, LEFT_Y, 0, 0), None)

@@ -31,7 +31,7 @@ from harness.drivers.car import car_of
 from harness.drivers.external import find_driver
 from harness.drivers.protocol import Driver
 from harness.errors import UsageError
-from harness.files import digest_of_file
+from harness.files import has_digest
 from harness.game.initial_state import member_in_episode
 from harness.game.roles import EGO
 from harness.road.scene.open_scene import OpenScene, open_scene
@@ -142,11 +142,4 @@ def policies_of_run(run: Path, written: str | None, hashes: Mapping[str, str]) -
     folders = sorted(each for each in ours.iterdir() if each.is_dir()) if ours.is_dir() else []
     if not PurePosixPath(written).is_absolute():
         folders += [start / written for start in (run.absolute().parent, run.absolute().parent.parent, Path.cwd())]
-    return next((folder for folder in folders if _holds(folder, read)), None)
-
-
-def _holds(folder: Path, read: Mapping[str, str]) -> bool:
-    try:
-        return all(digest_of_file(folder / place) == digest for place, digest in read.items())
-    except OSError:
-        return False
+    return next((each for each in folders if all(has_digest(each / name, [read[name]]) for name in read)), None)

@@ -16,7 +16,6 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from harness.campaign.plan.stages import stage_id
 from harness.campaign.results.shown_work import progress_bar
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.toml_reading import nearest
@@ -175,7 +174,7 @@ def read_game(record: Any, traces: Path, reader: TraceReader, scene: OpenScene) 
 
 def traces_of(folder: RunFolder, arm: str, seed: int, episode: int) -> Path:
     """The traces file of an arm and seed. Raises UsageError, which names the episode, if the folder lacks it."""
-    traces = folder.traces(stage_id(arm, seed))
+    traces = folder.traces_of_arm(arm, seed)
     if not traces.is_file():
         raise UsageError.of(
             folder.path,

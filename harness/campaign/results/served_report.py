@@ -12,7 +12,6 @@ from urllib.parse import unquote
 
 import pandas as pd
 
-from harness.campaign.plan.stages import stage_id
 from harness.campaign.results.recorded_games import tracks_of
 from harness.campaign.storage.run_folder import RunFolder
 from harness.errors import UsageError
@@ -64,7 +63,7 @@ class ServedReport:
 
     def _recorded(self, game: Any) -> bytes:
         with self._lock:  # the reader keeps one file open
-            trace = self._reader.read(self._folder.traces(stage_id(game.arm, game.seed)), game.episode)
+            trace = self._reader.read(self._folder.traces_of_arm(game.arm, game.seed), game.episode)
         crowds = crowds_of(self._folder.manifest())
         return game_text(tracks_of(trace, self._scene, game), self._marks, crowds).encode()
 

@@ -8,7 +8,6 @@ import pandas as pd
 from rich.console import Console
 from rich.progress import track
 
-from harness.campaign.plan.stages import stage_id
 from harness.campaign.results.replay_game import read_game
 from harness.campaign.results.shown_work import say
 from harness.campaign.storage.run_folder import RunFolder
@@ -27,7 +26,7 @@ def write_replays(folder: RunFolder, scene: OpenScene, episodes: pd.DataFrame, c
     say(console, WRITING_REPLAYS)
     chosen = list(worst_first(choose_games(episodes)).itertuples())
     for row in track(chosen, WRITING_REPLAYS, console=console, transient=True, disable=not console.is_terminal):
-        game = read_game(row, folder.traces(stage_id(row.arm, row.seed)), reader, scene)
+        game = read_game(row, folder.traces_of_arm(row.arm, row.seed), reader, scene)
         game.write_replay(folder.replays / game.name)
         names.append(game.name)
     for old in folder.replays.iterdir():

@@ -28,12 +28,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from harness.campaign.plan.stages import stage_id
 from harness.campaign.storage.checksums import mismatches, read_checksums, write_checksums
 from harness.campaign.storage.locks import InUse, only_one, wait_for_workers
 from harness.campaign.storage.manifest import RUN_AGAIN, StageEntry, read_manifest
 from harness.campaign.storage.run_log import LOG, run_log
 from harness.errors import Problem, UsageError
-from harness.files import content_of, digest_of_file, drop_scratch, leads_out, make_folder, write_atomically
+from harness.files import content_of, drop_scratch, has_digest, leads_out, make_folder, write_atomically
 
 MANIFEST = "manifest.json"
 JUDGED = "reference_drivers.csv"
@@ -47,13 +48,6 @@ def _has_only_locks(folder: Path) -> bool:
     """Whether a folder holds nothing but folders, locks and a log, as a command leaves it that was killed at once."""
     names = [name for _, _, files in os.walk(folder) for name in files if name != LOG]
     return all(name.startswith(("lock", f".{MANIFEST}.")) or name.endswith(".lock") for name in names)
-
-
-def _is_one_of(file: Path, hashes: Mapping[str, str]) -> bool:
-    try:
-        return digest_of_file(file) in hashes.values()
-    except OSError:
-        return False
 
 
 @dataclass(frozen=True)
@@ -79,6 +73,9 @@ class RunFolder:
 
     def traces(self, stage: str) -> Path:
         return self.path / "traces" / f"{stage}.parquet"
+
+    def traces_of_arm(self, arm: str, seed: int) -> Path:
+        return self.traces(stage_id(arm, seed))
 
     def tensorboard(self, stage: str) -> Path:
         return self.path / "tensorboard" / stage
@@ -173,7 +170,7 @@ class RunFolder:
         for name in done:
             record = self.done(name)
             damaged += [self.work(name) / "done.json"] if record is None else mismatches(record, self.path)
-        damaged += [file for file in sorted(self.scene.glob("*")) if not _is_one_of(file, manifest["hashes"])]
+        damaged += [file for file in sorted(self.scene.glob("*")) if not has_digest(file, manifest["hashes"].values())]
         if damaged:
             message, remedy = "is missing, or is not what the campaign wrote", "run the campaign again"
             raise UsageError(Problem(str(file), "", message, remedy) for file in damaged)

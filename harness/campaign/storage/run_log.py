@@ -56,7 +56,8 @@ def run_log(folder: Path) -> Iterator[None]:
     try:
         yield
     except BaseException as error:
-        LOGGER.error("ended by %s: %s", type(error).__name__, error, exc_info=_is_a_bug(error))
+        is_a_bug = isinstance(error, Exception) and not isinstance(error, HarnessError | OSError)
+        LOGGER.error("ended by %s: %s", type(error).__name__, error, exc_info=is_a_bug)
         raise
     else:
         LOGGER.info("ended after %.0f s", time.monotonic() - started)
@@ -64,8 +65,3 @@ def run_log(folder: Path) -> Iterator[None]:
         LOGGER.removeHandler(handler)
         LOGGER.setLevel(level)
         handler.close()
-
-
-def _is_a_bug(error: BaseException) -> bool:
-    """Whether the traceback is worth keeping: the message of other errors says what to do."""
-    return isinstance(error, Exception) and not isinstance(error, HarnessError | OSError)

@@ -54,10 +54,10 @@ def _summary_row(arm: str, persona: str, seed: int, games: pd.DataFrame) -> dict
         "mean_speed_high_mps": speed_high,
         **{metric.mean: played[f"ego_{name}"].mean() for name, metric in MEANS.items() if "ego" in metric.whose},
         **goal_rate,
-        **{f"non_ego_{name}": _mean(of_people(played, name)) for name in MEANS if "person" in MEANS[name].whose},
+        **{
+            f"non_ego_{name}": pd.Series(of_people(played, name).to_numpy(dtype=np.float64).ravel()).mean()
+            for name in MEANS
+            if "person" in MEANS[name].whose
+        },
         **rate_cells("near_miss_rate", near_misses.sum(), len(near_misses)),
     }
-
-
-def _mean(cells: pd.DataFrame) -> float:
-    return float(pd.Series(cells.to_numpy(dtype=np.float64).ravel()).mean())

@@ -9,7 +9,6 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 from sumolib.net import Net
-from sumolib.net.node import Node
 
 from harness.config.road_user import WALKER_LENGTH_M, WALKER_WIDTH_M
 from harness.config.scene import Scene
@@ -126,7 +125,8 @@ def _junction_crossed(net: Net, way: shapely.LineString, *, marked: bool) -> str
     """The first junction inside which a way crosses a lane of traffic; None if there is none. A marked crossing may lie
     in a junction without signals: the walker has priority there, whichever way a vehicle goes."""
     for edge in net.getEdges(withInternal=True):
-        if edge.getFunction() != "internal" or (marked and not _has_signals(edge.getFromNode())):
+        has_signals = any(link.getTLSID() for link in edge.getFromNode().getConnections())
+        if edge.getFunction() != "internal" or (marked and not has_signals):
             continue
         for lane in edge.getLanes():
             line = lane_line(lane)
@@ -134,7 +134,3 @@ def _junction_crossed(net: Net, way: shapely.LineString, *, marked: bool) -> str
             if is_road and way.intersects(shapely.LineString(line)):
                 return str(edge.getFromNode().getID())
     return None
-
-
-def _has_signals(node: Node) -> bool:
-    return any(link.getTLSID() for link in node.getConnections())

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from harness.evaluation.game_theory.dominance import dominated, safest_mixture
+from harness.evaluation.game_theory.empirical_game import dominated, safest_mixture
 
 NAMES = ("naive", "retrained", "robust")
 
