@@ -57,7 +57,8 @@ def run_forked(
     with ours, theirs, open(os.devnull, "rb") as nothing, TemporaryFile() as printed, TemporaryFile() as complained:
         request = json.dumps([list(command), str(cwd or Path.cwd())]).encode()
         streams = [each.fileno() for each in (nothing, printed, complained, theirs)]
-        socket.send_fds(_server(os.getpid()), [request], streams)
+        requests, _ = _server(os.getpid())
+        socket.send_fds(requests, [request], streams)
         theirs.close()
         pid = int.from_bytes(ours.recv(8), "little")
         ours.settimeout(timeout_s)
@@ -77,15 +78,14 @@ def _text(file: IO[bytes]) -> str:
 
 
 @cache
-def _server(owner: int) -> socket.socket:
-    """The socket of this process's server, which ends with the process `owner`."""
+def _server(owner: int) -> tuple[socket.socket, subprocess.Popen[bytes]]:
+    """The server of the process `owner`, with which it ends, behind its socket."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     with theirs:
         program = f"from {__name__} import serve; serve({theirs.fileno()})"
-        subprocess.Popen(
-            [sys.executable, "-c", program], cwd=REPOSITORY, pass_fds=(theirs.fileno(),), stdin=subprocess.DEVNULL
-        )
-    return ours
+        command = [sys.executable, "-c", program]
+        server = subprocess.Popen(command, cwd=REPOSITORY, pass_fds=(theirs.fileno(),), stdin=subprocess.DEVNULL)
+    return ours, server
 
 
 def serve(descriptor: int) -> None:
