@@ -112,10 +112,10 @@ def campaign_side(timer: LapTimer, steps: int, episodes: int) -> None:
             end_s = time.perf_counter()
         stages = {}
         for stage in recorder.stages:
-            info, progress = recorder.infos[stage.id], recorder.progress[stage.id]
+            info = recorder.infos[stage.id]
             stages[stage.id] = {"seed": stage.seed, "needs": list(stage.needs), "seconds": float(info["seconds"])}
             if isinstance(stage, TrainingStage):
-                (first_s, first), (last_s, last) = progress[0], progress[-1]
+                (first_s, first), *_, (last_s, last) = recorder.progress[stage.id]
                 stages[stage.id] |= {"steps": info["steps"], "steps_per_s": (last - first) / (last_s - first_s)}
         report_s = end_s - max(recorder.ended_s.values())
         timer.finish_lap(1.0, stages=stages, whole_s=end_s - start_s, report_s=report_s)

@@ -48,7 +48,7 @@ def drifts(course: Course, player: int) -> Iterator[Span]:
     state, drove = course.quantities.state, course.drove[:, player]
     lapsed = drove & state.lapsed[:, player]
     for first, last in runs(lapsed):
-        yield from _drift(course, player, first, last, "in a lapse of attention")
+        yield from _drift(course, player, first, last, how="in a lapse of attention")
     steering = state.steering_rad[:, player]
     if not course.game.steers[player]:
         return
@@ -56,10 +56,10 @@ def drifts(course: Course, player: int) -> Iterator[Span]:
     for first, last in runs(drove & still & ~lapsed):
         out = course.quantities.lane_offset_m[first : last + 1, player] >= least.OUT_OF_LANE_M - SLACK
         if last - first + 1 >= course.steps(least.HANDS_OFF_LEAST_S) and out.any():
-            yield from _drift(course, player, first, last, "out of its lane with the wheel held still")
+            yield from _drift(course, player, first, last, how="out of its lane with the wheel held still")
 
 
-def _drift(course: Course, player: int, first: int, last: int, how: str) -> Iterator[Span]:
+def _drift(course: Course, player: int, first: int, last: int, *, how: str) -> Iterator[Span]:
     begin = max(first - 1, 0)  # a row has the position at the end of its step
     moved = course.sideways_m[begin : last + 1, player] - course.sideways_m[begin, player]
     most = moved[np.abs(moved).argmax()]
@@ -131,21 +131,21 @@ def _while(mask: BoolArray, step: int) -> int:
 
 def fails_to_yield(course: Course, player: int) -> Iterator[Span]:
     """The player enters the way of a road user that has priority and is near."""
-    yield from _entries(course, player, least.FAILS_TO_YIELD_S, "does not yield to traffic", None)
+    yield from _entries(course, player, least.FAILS_TO_YIELD_S, what="does not yield to traffic", among=None)
 
 
 def turns_across(course: Course, player: int) -> Iterator[Span]:
     """The player turns across the way of oncoming traffic with priority in a short gap."""
     across = course.quantities.world.right_of_way.conflicts.across
-    yield from _entries(course, player, least.TURNS_ACROSS_S, "turns across oncoming traffic", across)
+    yield from _entries(course, player, least.TURNS_ACROSS_S, what="turns across oncoming traffic", among=across)
 
 
-def _entries(course: Course, player: int, within_s: float, what: str, conflicts: BoolArray | None) -> Iterator[Span]:
+def _entries(course: Course, player: int, within_s: float, *, what: str, among: BoolArray | None) -> Iterator[Span]:
     """The passages of zones that the player enters with at most this gap to a road user with priority, once per road
-    user; only those of the marked conflicts [C]."""
+    user; only those of the conflicts marked in `among` [C]."""
     seen: dict[int, Encounter] = {}
     for each in course.encounters(player):
-        marked = conflicts is None or conflicts[each.conflict]
+        marked = among is None or among[each.conflict]
         if marked and each.must_yield and each.gap_s <= within_s + SLACK and each.body not in seen:
             seen[each.body] = each
     for each in seen.values():
