@@ -1,7 +1,7 @@
 """Where the time of an arena's step goes: the parts of the table in `harness.environments.arena`.
 
-Each part is timed on its own, without the time of the parts inside it. A part whose function has been renamed in the
-arena is counted to the rest.
+Each part is timed on its own, without the time of the parts inside it. An AttributeError says that a function of a part has
+been renamed.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from benchmarks.games import GAMES, CoastingGames, merge_scene
 from benchmarks.profiler import Profiler
 from benchmarks.traffic import write_scene
 from harness.environments import arena as arena_module
+from harness.game.road import Routes
 from harness.road.scene.open_scene import open_scene
 from harness.sumo.background_traffic import BackgroundTraffic
 
@@ -24,8 +25,8 @@ _PARTS = (
     ("drivers, attention, requests", "decide", arena_module.Arena, "_decide"),
     ("the players' cars move", "drive", arena_module, "move"),
     ("background traffic near the players is read", "read", BackgroundTraffic, "read"),
-    ("players are located along their routes", "locate", arena_module.Arena, "_locate"),
-    ("contact, goal, time", "terminations", arena_module.Arena, "_terminations"),
+    ("players are located along their routes", "locate", Routes, "locate"),
+    ("outcomes", "terminations", arena_module, "terminations"),
     ("payoffs", "payoffs", arena_module.Arena, "_payoffs"),
     ("observations", "observe", arena_module, "observe"),
     ("players that ended are removed or halted", "finish", arena_module.Arena, "_finish"),
@@ -56,7 +57,7 @@ def _table(coasting: CoastingGames, seconds: float, steps_per_pass: int, reset_e
     rows = [(words, microseconds[part]) for words, part, *_ in _PARTS if part in microseconds]
     rows.insert(2, ("SUMO alone: placements and its step", bare_us))
     rows.insert(3, ("around SUMO: poses in, readings out", microseconds["simulation"] - bare_us))
-    rows.append(("the rest", microseconds["rest"]))
+    rows.append(("contact and the rest", microseconds["rest"]))
     whole_us = sum(part_us for _, part_us in rows)
     lines = ["| part | µs per game-step | share |", "| --- | ---: | ---: |"]
     lines += [f"| {words} | {part_us:.2f} | {part_us / whole_us:.0%} |" for words, part_us in rows]
@@ -67,8 +68,7 @@ def _time_parts(coasting: CoastingGames, seconds: float, steps_per_pass: int, re
     """Microseconds per game-step of each part; `simulation` and `rest` included."""
     profiler = Profiler()
     for _, part, owner, name in _PARTS:
-        if hasattr(owner, name):
-            setattr(owner, name, profiler.wrap(part, getattr(owner, name)))
+        setattr(owner, name, profiler.wrap(part, getattr(owner, name)))
     simulation: Any = coasting.arena.simulation
     simulation.step = profiler.wrap("simulation", simulation.step)
     step = profiler.wrap("rest", lambda: coasting.step(reset_ended))

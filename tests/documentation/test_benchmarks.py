@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.figures import MEASUREMENTS
+from benchmarks.figures import KEYS, MEASUREMENTS
 from tests.support.repository import REPOSITORY
 
 NEEDS_EXTRA = {"vs_highway_env"}
@@ -29,3 +29,16 @@ def test_fast__measures_every_figure(measurement, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
     figures = json.loads(results.read_text(encoding="utf-8"))
     assert [key for key in measurement.keys if figures[key] is None] == []
+
+
+def test_published__every_figure_is_measured() -> None:
+    published = json.loads((REPOSITORY / "benchmarks" / "results.json").read_text(encoding="utf-8"))
+    assert [key for key in KEYS if published.get(key) is None] == []
+
+
+@pytest.mark.slow
+def test_step__times_every_part() -> None:
+    command = [sys.executable, "-m", "benchmarks", "step", "--seconds", "1"]
+    done = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "contact and the rest" in done.stdout
