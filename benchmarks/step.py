@@ -1,7 +1,7 @@
 """Where the time of an arena's step goes: the parts of the table in `harness.environments.arena`.
 
-Each part is timed on its own, without the time of the parts inside it. An AttributeError says that a function of a part has
-been renamed.
+Each part is timed on its own, without the time of the parts inside it. An AttributeError says that a function of
+a part has been renamed.
 """
 
 from __future__ import annotations
