@@ -41,12 +41,13 @@ def conflict_table(conflicts: Sequence[Candidate]) -> Table:
 
 def plan_table(rows: Sequence[tuple[GamePlan, str]]) -> Table:
     """A row for each game that can be made on a map, with its place."""
-    table = _table("conflict", "kind", "place", "ego", "person", "priority")
+    table = _table("conflict", "score", "kind", "place", "ego", "person", "priority")
     for plan, place in rows:
         candidate = plan.candidate
         person = "on foot" if candidate.second is None else " to ".join(candidate.second.edges)
         ego = " to ".join(dict.fromkeys(candidate.first.edges))
-        cells = (str(plan.number), candidate.kind.value, place, ego, person, plan_priority(plan))
+        numbers = str(plan.number), f"{plan.score:.0f}"
+        cells = (*numbers, candidate.kind.value, place, ego, person, plan_priority(plan))
         table.add_row(*(Text(plain(cell)) for cell in cells))
     return table
 

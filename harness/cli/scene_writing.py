@@ -6,9 +6,10 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+from harness.assessment.route_trial import try_routes
 from harness.cli import messages
 from harness.cli.new_documents import check_name, rendered
 from harness.errors import Problem, UsageError, plain
@@ -56,29 +57,38 @@ def files_of(name: str, out: Path) -> tuple[Path, Path]:
     return out / "networks" / name, out / "campaigns" / f"{name}.toml"
 
 
-def write_scenes(opened: OpenMap, chosen: dict[str, GamePlan], out: Path) -> tuple[list[str], list[Problem]]:
-    """Write a scene and a campaign for each name; each scene is checked as `harness check` does.
+def write_scenes(
+    opened: OpenMap,
+    chosen: Mapping[str, Sequence[GamePlan]],
+    out: Path,
+    on_plan: Callable[[GamePlan], None] = lambda plan: None,
+) -> tuple[dict[str, GamePlan], list[Problem]]:
+    """Write a scene and a campaign for each name, of the first of its plans that is in order: `harness check` accepts
+    the scene, and a rule-based driver can drive its routes. `on_plan` gets each plan before its check.
 
-    Returns the names that were written, and the problems of those that were not. Nothing is half written: every file is
-    complete before the first one gets its name. Raises UsageError if no scene can be written.
+    Returns the plans that were written, by name, and the problems of the others. Nothing is half written: every file
+    is complete before the first one gets its name. Raises UsageError if no scene can be written.
     """
     problems: list[Problem] = []
     with tempfile.TemporaryDirectory(prefix="harness-map-") as folder:
-        ready: dict[str, Path] = {}
-        for name, plan in chosen.items():
-            try:
-                ready[name] = _checked(opened, name, plan, Path(folder))
-            except UsageError as error:
-                problems += [
-                    Problem(f"conflict {plan.number}", each.key, each.message, each.remedy) for each in error.problems
-                ]
+        ready: dict[str, tuple[Path, GamePlan]] = {}
+        for name, plans in chosen.items():
+            for plan in plans:
+                on_plan(plan)
+                try:
+                    ready[name] = _checked(opened, name, plan, Path(folder)), plan
+                    break
+                except UsageError as error:
+                    shutil.rmtree(Path(folder, name))
+                    subject = f"conflict {plan.number}"
+                    problems += [Problem(subject, each.key, each.message, each.remedy) for each in error.problems]
         if not ready:
             raise UsageError(problems)
         try:
-            _put(opened, {name: (path, chosen[name]) for name, path in ready.items()}, out)
+            _put(opened, ready, out)
         except OSError as error:
             raise UsageError.of(out, "", *messages.cannot_write(error)) from None
-    return list(ready), problems
+    return {name: plan for name, (_, plan) in ready.items()}, problems
 
 
 def _checked(opened: OpenMap, name: str, plan: GamePlan, folder: Path) -> Path:
@@ -87,7 +97,15 @@ def _checked(opened: OpenMap, name: str, plan: GamePlan, folder: Path) -> Path:
     is_part = write_part(opened.net, opened.net_file, plan.edges, scene / f"{name}.net.xml")
     for file, text in _scene_files(name, plan, opened, is_part=is_part).items():
         (scene / file).write_text(text, encoding="utf-8")
-    check_loads(open_scene(scene))
+    opened_scene = open_scene(scene)
+    check_loads(opened_scene)
+    problems = [
+        Problem(scene.name, "", trial.sentence(), "choose another conflict")
+        for trial in try_routes(opened_scene)
+        if trial.failure
+    ]
+    if problems:
+        raise UsageError(problems)
     return scene
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
     from harness.maps.game_plans import GamePlan
     from harness.maps.open_map import OpenMap
+
+_MOST_TRIED = 10  # conflicts, until one is in order
 
 scene_app = typer.Typer(no_args_is_help=True, help="Make scenes from maps, and show nets and scenes.")
 
@@ -86,13 +88,19 @@ def show_scene(
 
 
 def check_scene(folder: Path) -> list[str]:
-    """Check one scene, as a campaign that names it does; the lines to print. Raises UsageError with every problem."""
+    """Check one scene as a campaign that names it does, and drive its routes. Returns the lines to print.
+
+    Raises UsageError with every problem.
+    """
+    from harness.assessment.route_trial import try_routes
     from harness.road.scene.load_check import check_loads
     from harness.road.scene.open_scene import open_scene
 
     scene = open_scene(folder)
     check_loads(scene)
-    return [f"{folder} is in order.", *messages.scene_lines(scene), *scene.warnings]
+    trials = try_routes(scene)
+    found = [f"warning: {trial.sentence()}" for trial in trials if trial.failure]
+    return [f"{folder} is in order.", *messages.scene_lines(scene), *scene.warnings, *found]
 
 
 def folder_of_scene(path: Path) -> Path | None:
@@ -119,7 +127,7 @@ def new_scene(
         int | None,
         typer.Option(
             metavar="K",
-            help="Make the scene of this conflict.  [default: the first one without traffic lights, if there is one]",
+            help="Make the scene of this conflict.  [default: the first one that a rule-based driver can drive]",
         ),
     ] = None,
     every: Annotated[
@@ -144,8 +152,9 @@ def new_scene(
 ) -> None:
     """Make scenes from a map: the places where the ways of two road users cross or merge, found in its right of way.
 
-    Lists these conflicts with their numbers, and writes a scene of one of them, or of each: the net, the players'
-    routes, starts from which they meet, goals, and a campaign.
+    Lists these conflicts with their numbers, the best question first, and writes a scene of one of them, or of each:
+    the net, the players' routes, starts from which they meet, goals, and a campaign. A rule-based driver first drives
+    both routes alone; a conflict with a route that it can't drive makes no scene.
     """
     from harness.cli.scene_writing import check_new
     from harness.maps.open_map import open_map
@@ -159,9 +168,9 @@ def new_scene(
         with console.status(messages.reading(source)):
             opened = open_map(source, Path(folder), left_hand=left_hand)
         plans = _wanted(opened, kind, near, within)
-        chosen = {name: _numbered(opened, conflict, plans)}
+        chosen = {name: plans[:_MOST_TRIED] if conflict is None else [_numbered(opened, conflict)]}
         if every:
-            chosen = {f"{name}_{plan.number}": plan for plan in plans}
+            chosen = {f"{name}_{plan.number}": [plan] for plan in plans}
             check_new(name, [] if only_list else list(chosen), out)
         _show(opened, plans[:rows], console)
         if len(plans) > rows:
@@ -185,10 +194,7 @@ def _wanted(opened: OpenMap, kind: str | None, near: str | None, within_m: float
     return [plan for plan in plans if plan.candidate.kind.value == kind]
 
 
-def _numbered(opened: OpenMap, number: int | None, plans: Sequence[GamePlan]) -> GamePlan:
-    """The plan of a number; without one, the first of `plans` without signals, which take long to learn, if any."""
-    if number is None:
-        return next((plan for plan in plans if not plan.candidate.with_signals), plans[0])
+def _numbered(opened: OpenMap, number: int) -> GamePlan:
     if not 1 <= number <= len(opened.plans):
         remedy = f"choose one from 1 to {len(opened.plans)}: --list lists them"
         raise UsageError.of("--conflict", str(number), "there is no conflict of this number", remedy)
@@ -215,15 +221,17 @@ def _write_page(opened: OpenMap, plans: Sequence[GamePlan], file: Path) -> None:
     write_net_page(drawing_of(opened.source.name, *opened.listed(), places), file)
 
 
-def _write(opened: OpenMap, chosen: dict[str, GamePlan], out: Path, console: Console) -> None:
+def _write(opened: OpenMap, chosen: Mapping[str, Sequence[GamePlan]], out: Path, console: Console) -> None:
     from harness.cli.scene_writing import files_of, write_scenes
 
-    with console.status("making and checking scenes"):
-        written, problems = write_scenes(opened, chosen, out)
-    for each in written:
-        (scene, campaign), plan = files_of(each, out), chosen[each]
-        print_plain([f"conflict {plan.number}, {plain(opened.place_of(plan))}: wrote {scene} and {campaign}"], console)
+    with console.status("making scenes") as status:
+        written, problems = write_scenes(
+            opened, chosen, out, lambda plan: status.update(f"conflict {plan.number}: making and driving the scene")
+        )
     print_plain([str(problem) for problem in problems], console)
-    print_plain([f"Next: harness campaign {files_of(written[0], out)[1]} --quick"], console)
-    if problems:
+    for name, plan in written.items():
+        scene, campaign = files_of(name, out)
+        print_plain([f"conflict {plan.number}, {plain(opened.place_of(plan))}: wrote {scene} and {campaign}"], console)
+    print_plain([f"Next: harness campaign {files_of(next(iter(written)), out)[1]} --quick"], console)
+    if len(written) < len(chosen):
         raise typer.Exit(FAILED)

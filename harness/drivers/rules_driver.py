@@ -15,6 +15,7 @@ import numpy as np
 from harness.config.rule_driver import (
     REACTIONS,
     CarefulAndCompetent,
+    Cruise,
     EmergencyBraking,
     FuzzySafety,
     LaneKeeping,
@@ -32,6 +33,15 @@ CALM_S = 1.0
 _CRUISING, _REQUESTED, _ROWS = 3, 4, 5
 """Rows of a driver's state, after those of `ReactionState`: what cruise control and driver requested last, in m/s²."""
 _Law: TypeAlias = EmergencyBraking | CarefulAndCompetent | Rss | FuzzySafety
+
+LANE_KEEPER = Rules(
+    kind="rules",
+    name="lane_keeper",
+    description="Cruises and keeps its lane, with so little inertia that its actions follow from what it sees.",
+    cruise=Cruise(max_jerk_mps3=50.0),
+    lane_keeping=LaneKeeping(max_lateral_jerk_mps3=20.0),
+)
+"""The driver that new policies imitate, and that tries the routes of scenes."""
 
 
 @dataclass(frozen=True, kw_only=True)

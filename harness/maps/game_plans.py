@@ -13,7 +13,7 @@ from sumolib.net import Net
 
 from harness.game.arrays import FloatArray
 from harness.game.road import SPACING_M
-from harness.maps.candidates import Candidate, CandidateKind, LaneWay, candidates, following
+from harness.maps.candidates import Candidate, CandidateKind, LaneWay, Priority, candidates, following
 from harness.maps.planned_routes import PlannedRoute, following_m, planned_route, sampled_to, way_over
 from harness.road.net.route_table import meeting_of_lines
 
@@ -24,6 +24,7 @@ _SLOWER = (1.0, 0.8, 0.65, 0.5)
 _SLOWEST_MPS = 4.0
 _SECONDS = (6.5, 5.5, 5.0, 4.5, 4.0)  # from the farthest start of the ego to the place, at its highest speed
 _TRIES = tuple(product(_SLOWER, _SECONDS))  # the best first
+_BEFORE_LIGHTS = (1.0, 8.5)  # tried first where a player comes to a traffic light: time to see it, and to stop
 _START_RANGE_S = 1.5
 _APART_S = 1.5  # between the arrivals, at most
 _WALK_MPS, _WALK_APART_S = (1.0, 1.4), 2.0
@@ -34,6 +35,10 @@ _NEAR_M = 25.0  # between the place of a candidate and that where the routes mee
 _BESIDE_M = 8.0
 _LEAST_FOLLOWING = 0.7
 _EXAMPLE = ", such as "
+_LESS_SHARP = {CandidateKind.LANE_END: 0.8, CandidateKind.ZEBRA: 0.7, CandidateKind.FOLLOWING: 0.4}  # than a crossing
+_NO_PRIORITY, _SIGNALS = 0.7, 0.5  # who has to wait is less clear; a red light takes long to learn
+_ALL_TURNS_DEG = 360.0  # of both routes, beside which the score is halved
+_BRAKING_MPS2, _REACTION_S = 3.0, 1.0  # of a driver who sees a stop line at the start
 _SPARE_S = 8.0
 _TIME_LIMITS_S = (30.0, 300.0)
 
@@ -57,6 +62,8 @@ class GamePlan:
     ego_route: PlannedRoute
     ego: Start
     person: Start
+    approach: float
+    """Length of the way to the place, as a share of the longest that is tried."""
     person_route: PlannedRoute | None = None
     way: FloatArray | None = None  # [n, 2] of a person on foot
     number: int = 0
@@ -70,6 +77,18 @@ class GamePlan:
     def edges(self) -> set[str]:
         """The edges of the players' routes."""
         return {name for route in (self.ego_route, self.person_route) if route is not None for name in route.edges}
+
+    @property
+    def score(self) -> float:
+        """0 to 100: how well the game asks its question. It is higher with a longer approach, straighter routes, a
+        rule of priority, and no traffic light."""
+        sharp = _LESS_SHARP.get(self.candidate.kind, 1.0)
+        if self.candidate.with_signals:
+            sharp *= _SIGNALS
+        elif self.candidate.priority is not Priority.FIRST and self.candidate.second is not None:
+            sharp *= _NO_PRIORITY
+        turns_deg = sum(sum(route.turns_deg) for route in (self.ego_route, self.person_route) if route is not None)
+        return 100.0 * sharp * self.approach / (1.0 + turns_deg / _ALL_TURNS_DEG)
 
     def time_limit_s(self, reds_s: Mapping[str, float]) -> float:
         """Time enough for both from their farthest starts, at the speed of the slowest, and for the longest red of each
@@ -99,18 +118,20 @@ class Plans:
 
     @cached_property
     def all(self) -> list[GamePlan]:
-        """A plan of each candidate. A net on which no two ways meet has the longest roads instead."""
+        """A plan of each candidate, the highest score first. A net on which no two ways meet has the longest roads
+        instead."""
         found: list[GamePlan] = []
         reasons: dict[str, str] = {}  # the first of each with its example
         for group in (candidates, following):
             for candidate in group(self.net) if not found else ():
                 plan = self._plan(candidate)
                 if isinstance(plan, GamePlan):
-                    found.append(replace(plan, number=len(found) + 1))
+                    found.append(plan)
                 else:
                     reason = reasons.setdefault(plan.partition(_EXAMPLE)[0], plan)
                     self.left_out[reason] = self.left_out.get(reason, 0) + 1
-        return found
+        best_first = sorted(found, key=lambda plan: -round(plan.score))  # of equal ones, the first candidate's
+        return [replace(plan, number=number) for number, plan in enumerate(best_first, start=1)]
 
     def _plan(self, candidate: Candidate) -> GamePlan | str:
         ways = [way for way in (candidate.first, candidate.second) if way is not None]
@@ -119,6 +140,8 @@ class Plans:
         ego_route = self._route(candidate.first)
         if ego_route is None:
             return "no room for a goal behind it"
+        if ego_route.refusal:
+            return ego_route.refusal
         if candidate.second is None:
             return self._on_foot(candidate, ego_route)
         if candidate.kind is CandidateKind.FOLLOWING:
@@ -126,11 +149,13 @@ class Plans:
         route = self._route(candidate.second)
         if route is None:
             return "no room for a goal behind it"
+        if route.refusal:
+            return route.refusal
         if candidate.first.start.getEdge() is candidate.second.start.getEdge():
             return self._from_the_same_edge(candidate, ego_route, route) or "too little road before it"
         for before_m in (None, 80.0, 40.0):  # longer routes may meet before the place
             routes = [self._route(way, before_m) for way in (candidate.first, candidate.second)]
-            if routes[0] is not None and routes[1] is not None:
+            if routes[0] is not None and routes[1] is not None and not (routes[0].refusal or routes[1].refusal):
                 plan = _timed(candidate, ego_route=routes[0], route=routes[1], within_m=_NEAR_M)
                 if plan is not None:
                     return plan
@@ -161,6 +186,7 @@ class Plans:
             if low_m - _BESIDE_M >= 1.0:
                 return GamePlan(
                     candidate=candidate,
+                    approach=slower,
                     ego_route=ego_route,
                     person_route=route,
                     ego=Start(
@@ -194,7 +220,10 @@ class Plans:
             start = _ego_start(found.ego_m, speed, seconds)
             if start.range[0] >= _FIRST_START_M and found.other_m >= _WALK_MPS[1] * most_s:
                 person = _arriving(_WALK_APART_S, _WALK_MPS, found.other_m - _WALK_MPS[1] * most_s)
-                return GamePlan(candidate=candidate, ego_route=ego_route, ego=start, person=person, way=way)
+                approach = slower * seconds / _SECONDS[0]
+                return GamePlan(
+                    candidate=candidate, approach=approach, ego_route=ego_route, ego=start, person=person, way=way
+                )
         return "too little road or pavement before it"
 
 
@@ -206,14 +235,20 @@ def _timed(candidate: Candidate, *, ego_route: PlannedRoute, route: PlannedRoute
     point = ego_route.line[min(round(found.ego_m / SPACING_M), len(ego_route.line) - 1)]
     if float(np.hypot(*(point - candidate.place))) > within_m:
         return None
-    for slower, seconds in _TRIES:
+    tries = (_BEFORE_LIGHTS, *_TRIES) if ego_route.lights or route.lights else _TRIES
+    for slower, seconds in tries:
         speed, other = _speeds(ego_route.limit_mps, slower), _speeds(route.limit_mps, slower)
         start = _ego_start(found.ego_m, speed, seconds)
         most_s = seconds * speed[1] / speed[0] + _APART_S
         first_m = found.other_m - other[1] * most_s
-        if min(start.first_m, first_m) >= _FIRST_START_M:
+        least_s = max(seconds - _START_RANGE_S - _APART_S, 0.0)
+        clear = _clear(ego_route, start.range, speed[1]) and all(
+            _clear(route, (found.other_m - mps * most_s, found.other_m - mps * least_s), mps) for mps in other
+        )
+        if clear and min(start.first_m, first_m) >= _FIRST_START_M:
             return GamePlan(
                 candidate=candidate,
+                approach=min(slower * seconds / _SECONDS[0], 1.0),
                 ego_route=ego_route,
                 person_route=route,
                 ego=start,
@@ -229,6 +264,7 @@ def _one_behind_the_other(candidate: Candidate, route: PlannedRoute) -> GamePlan
         return f"too short a road: {length_m:.0f} m of {needed_m:.0f} m"
     return GamePlan(
         candidate=candidate,
+        approach=1.0,
         ego_route=route,
         person_route=route,
         ego=Start(key="route_m", range=(10.0, 30.0), speed_mps=speed, first_m=10.0),
@@ -239,6 +275,12 @@ def _one_behind_the_other(candidate: Candidate, route: PlannedRoute) -> GamePlan
 def _ego_start(meeting_m: float, speed: Range, seconds: float) -> Start:
     farthest, nearest = (meeting_m - speed[1] * each for each in (seconds, seconds - _START_RANGE_S))
     return Start(key="route_m", range=_rounded(farthest, nearest), speed_mps=speed, first_m=farthest)
+
+
+def _clear(route: PlannedRoute, starts_m: Range, speed_mps: float) -> bool:
+    """Whether a car that starts at these stations (m) of its front can stop at each traffic light before it."""
+    stopping_m = _REACTION_S * speed_mps + speed_mps**2 / (2.0 * _BRAKING_MPS2)
+    return not any(starts_m[0] < at_m and at_m - stopping_m < starts_m[1] for at_m, _ in route.lights)
 
 
 def _arriving(apart_s: float, speed: Range, first_m: float) -> Start:

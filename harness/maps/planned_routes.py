@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -29,6 +30,7 @@ _SLOWER = 0.9
 _FREE_STATES = "MO"
 _FARTHEST_M = 12.0  # between the end of a crossing and that of a pavement
 _ONTO_M = 1.5  # of the pavement at the end of a way
+_SHARPEST_DEG = 105.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +44,14 @@ class PlannedRoute:
     goal_position_m: float
     limit_mps: float  # the lowest speed limit of the edges before the junction
     lights: tuple[tuple[float, str], ...]  # up to the junction: station and id of each traffic light
+    turns_deg: tuple[float, ...]  # at each junction, without sign
+
+    @property
+    def refusal(self) -> str:
+        """The reason against a route on which no game is offered; empty if there is none."""
+        if max(self.turns_deg, default=0.0) > _SHARPEST_DEG:
+            return f"turns above {_SHARPEST_DEG:.0f} degrees"
+        return "" if shapely.LineString(self.line).is_simple else "loops"
 
 
 def planned_route(net: Net, way: LaneWay, before_m: float, rings: Collection[str]) -> PlannedRoute | None:
@@ -101,7 +111,15 @@ def _with_goal(net: Net, edges: Sequence[Edge], place: int) -> PlannedRoute | No
             for k, edge in enumerate(before)
             for name in sorted({link.getTLSID() for link in _onward(edge) if link.getTLSID()})
         ),
+        turns_deg=tuple(_turn_deg(one, other) for one, other in pairwise(edges[: k + 1])),
     )
+
+
+def _turn_deg(before: Edge, behind: Edge) -> float:
+    """The angle between the end of an edge and the begin of the next."""
+    ends = np.array([lane_line(before.getLane(0))[-2:], lane_line(behind.getLane(0))[:2]])
+    (x, y), (next_x, next_y) = ends[:, 1] - ends[:, 0]
+    return abs(float(np.degrees(np.arctan2(x * next_y - y * next_x, x * next_x + y * next_y))))
 
 
 def sampled_to(line: shapely.LineString, until_m: float) -> FloatArray:

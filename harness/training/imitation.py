@@ -13,9 +13,8 @@ import numpy as np
 import torch
 from stable_baselines3 import PPO
 
-from harness.config.rule_driver import Cruise, LaneKeeping, Rules
 from harness.drivers.car import car_of
-from harness.drivers.rules_driver import RulesDriver
+from harness.drivers.rules_driver import LANE_KEEPER, RulesDriver
 from harness.environments.vector_env import ArenaVecEnv, JoinedVecEnv
 from harness.game.arrays import BoolArray, FloatArray
 
@@ -39,21 +38,12 @@ def imitate(model: PPO, environment: JoinedVecEnv, *, steps: int, deviation: flo
     _fit(model, observations, actions, returns, order=torch.Generator().manual_seed(seed))
 
 
-_DEMONSTRATOR = Rules(
-    kind="rules",
-    name="demonstrator",
-    description="Cruises and keeps its lane, with so little inertia that its actions follow from what it sees.",
-    cruise=Cruise(max_jerk_mps3=50.0),
-    lane_keeping=LaneKeeping(max_lateral_jerk_mps3=20.0),
-)
-
-
 def _demonstrate(
     environment: ArenaVecEnv, rounds: int, *, discount: float, deviation: float, noise: np.random.Generator
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """What the demonstrator saw [N, SIZE] and did [N, 2], without the noise, in so many steps of every game, and its
     returns [N]; NaN in games that had not ended."""
-    driver = RulesDriver(_DEMONSTRATOR, car_of(environment.arena.world, environment.learner))
+    driver = RulesDriver(LANE_KEEPER, car_of(environment.arena.world, environment.learner))
     games = np.arange(environment.num_envs)
     driver.reset(games)
     observation = environment.reset()

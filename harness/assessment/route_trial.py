@@ -1,0 +1,84 @@
+"""Trial of a scene's routes: a rule-based driver drives each player's route alone, from starts drawn for it.
+
+It keeps its lane, cruises, stops at red lights and yields, in the same kinematic car as every learner. A route that it
+can't drive is too sharp or too narrow, or its starts are impossible.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.drivers.car import car_of
+from harness.drivers.ordinary_walker import OrdinaryWalker
+from harness.drivers.rules_driver import LANE_KEEPER, RulesDriver
+from harness.environments.arena import Arena
+from harness.environments.seats import Seat
+from harness.game.human_factors import HumanFactors
+from harness.game.initial_state import draw_initial_state
+from harness.game.outcome import Outcome
+from harness.road.scene.open_scene import OpenScene
+
+STARTS = 50
+"""Starts of each player in a trial."""
+_ENDS = {
+    Outcome.RAIL: "touches the edge of the road",
+    Outcome.COLLISION: "touches an obstacle",
+    Outcome.TIMEOUT: "does not reach its goal in time",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class RouteTrial:
+    """The games of one player alone."""
+
+    role: str
+    starts: int
+    arrived: int
+    failure: str
+    """The end of the first game that does not reach the goal, in words with place and time; empty if all reach it."""
+
+    def sentence(self) -> str:
+        """The finding on a route that can't be driven from every start."""
+        share = f"from {self.arrived} of {self.starts} starts"
+        return f"{self.role}: alone, a rule-based driver reaches the goal {share}; {self.failure}"
+
+
+def try_routes(scene: OpenScene, *, starts: int = STARTS) -> list[RouteTrial]:
+    """The trial of each player's route. Raises SimulationError if SUMO can't load the scene."""
+    world, players = scene.world, range(len(scene.world.roles))
+    drivers = [
+        OrdinaryWalker(world, each) if world.walks[each] else RulesDriver(LANE_KEEPER, car_of(world, each))
+        for each in players
+    ]
+    drawn = {}
+    for player in players:
+        alone = scene.start_distribution([HumanFactors()] * len(players), [float(each == player) for each in players])
+        for number in range(starts):
+            drawn[player * starts + number] = draw_initial_state(alone, "route trial", player, number)
+    arena = Arena(scene, len(drawn), [Seat(each) for each in drivers])
+    try:
+        arena.reset(drawn)
+        lasted_s = np.zeros((arena.games, len(players)))
+        while (running := arena.state.running).any():
+            lasted_s += world.step_s * running
+            arena.step()
+        state = arena.state
+    finally:
+        arena.close()
+    trials = []
+    for player in players:
+        games = np.arange(player * starts, (player + 1) * starts)
+        failed = games[state.outcome[games, player] != Outcome.GOAL]
+        failure = ""
+        if len(failed):
+            first = (failed[0], player)
+            failure = (
+                f"from one of the others it {_ENDS[Outcome(int(state.outcome[first]))]} at ({state.x_m[first]:.1f}, "
+                f"{state.y_m[first]:.1f}) after {lasted_s[first]:.1f} s"
+            )
+        trials.append(
+            RouteTrial(role=world.roles[player], starts=starts, arrived=starts - len(failed), failure=failure)
+        )
+    return trials
