@@ -128,6 +128,11 @@ def names_of(requirements: Iterable[str]) -> set[str]:
     return {re.split(r"[^A-Za-z0-9._-]", each, maxsplit=1)[0].lower().replace("_", "-") for each in requirements}
 
 
+def lines_of(path: Path) -> list[str]:
+    """The requirements in a file of pip's, without comments and options."""
+    return [line for line in path.read_text(encoding="utf-8").splitlines() if line and line[0] not in "#-"]
+
+
 def imported(path: Path) -> set[str]:
     """The packages that a file imports from outside the standard library."""
     names = []
@@ -145,6 +150,20 @@ def test_metadata__names_every_library_that_the_package_imports() -> None:
     assert {name for name in needed if not names_of(provided.get(name, [name])) & users} == set()
 
 
+def test_metadata__examples_depend_on_this_distribution_and_on_locked_ones() -> None:
+    """An example that names another distribution would install a stranger's package."""
+    known = {DISTRIBUTION} | names_of(lines_of(REPOSITORY / "requirements.lock"))
+    for file in (REPOSITORY / "egos").rglob("requirements*.txt"):
+        assert names_of(lines_of(file)) <= known, file
+    projects = list((REPOSITORY / "egos").rglob("pyproject.toml"))
+    assert REPOSITORY / "egos/examples/python/pyproject.toml" in projects
+    for file in projects:
+        document = tomllib.loads(file.read_text(encoding="utf-8"))
+        extras = itertools.chain(*document["project"].get("optional-dependencies", {}).values())
+        needed = [*document["build-system"]["requires"], *document["project"].get("dependencies", []), *extras]
+        assert names_of(needed) <= known, file
+
+
 def test_metadata__hints_name_the_distribution_and_its_extras() -> None:
     """A hint about a library that is not installed says `pip install 'safedriverl-harness[EXTRA]'`."""
     extras = declared()[1]
@@ -153,3 +172,5 @@ def test_metadata__hints_name_the_distribution_and_its_extras() -> None:
     assert {name for name, _ in hints} == {DISTRIBUTION}
     assert {extra for _, extra in hints} <= set(extras)
     assert {"fmi", "ray", "docs"} <= {extra for _, extra in hints}
+    strangers = re.compile(r"pip install [^\n#`]*(?<![\w./-])harness(?![\w.-])")
+    assert [text for text in texts if strangers.search(text.read_text("utf-8"))] == []
