@@ -44,9 +44,16 @@ def shipped_names(kind: Kind) -> list[str]:
     return sorted(each.stem for each in found if kind in _FOLDERS or each.suffix == ".toml")
 
 
-def is_name(written: str) -> bool:
-    """Whether a document is named as in `scene = "merge"`, not by a path."""
-    return _NAME.fullmatch(written) is not None
+def shipped_policies() -> list[str]:
+    """The names of the shipped policies, such as `merge/naive-seed1`."""
+    folder = shipped("policies")
+    return sorted(each.parent.relative_to(folder).as_posix() for each in folder.glob("*/*/policy.json"))
+
+
+def is_name(written: str, kind: Kind) -> bool:
+    """Whether a document is named as in `scene = "merge"` or `driver = "merge/naive-seed1"`, not by a path."""
+    parts = written.split("/", 1) if kind == "policies" else [written]  # a folder of policies, and a policy in it
+    return all(_NAME.fullmatch(each) for each in parts)
 
 
 def find_document(written: str, folder: Path, kind: Kind) -> Path:
@@ -56,7 +63,7 @@ def find_document(written: str, folder: Path, kind: Kind) -> Path:
     document in the folder, in its subfolder of the kind, or of a shipped document: the first that exists.
     """
     beside = Path(os.path.realpath(folder / written))
-    if not is_name(written) or os.path.exists(beside):
+    if not is_name(written, kind) or os.path.exists(beside):
         return beside
     file = written if kind in _FOLDERS else f"{written}.toml"
     for place in (folder, folder / kind, shipped(kind)):
@@ -71,7 +78,7 @@ def named_document(written: str, kind: Kind) -> Path:
     Raises UsageError if it is a name of no document.
     """
     found = find_document(written, Path(), kind)
-    if is_name(written) and not os.path.exists(found):
+    if is_name(written, kind) and not os.path.exists(found):
         raise UsageError.of(written, "", *missing_document(written, Path(), kind))
     return found
 
@@ -81,7 +88,7 @@ def document_at(path: Path, kind: Kind) -> Path:
 
     Raises UsageError if it is a name of no document.
     """
-    return path if os.path.exists(path) or not is_name(str(path)) else named_document(str(path), kind)
+    return path if os.path.exists(path) or not is_name(str(path), kind) else named_document(str(path), kind)
 
 
 def missing_document(written: str, folder: Path, kind: Kind) -> tuple[str, str]:

@@ -13,10 +13,11 @@ import sys
 import sysconfig
 from collections.abc import Iterable
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
-from harness.shipped_documents import shipped_names
+from harness.shipped_documents import Kind, shipped_names, shipped_policies
 from tests.support.repository import REPOSITORY
 from tests.support.shipped import TWO_GAMES
 from tests.support.sources import SOURCES, tree_of
@@ -85,9 +86,19 @@ def test_wheel__has_every_shipped_document_and_is_typed(environment: Path, tmp_p
     package = Path(python(environment, tmp_path, "import harness; print(harness.__file__)")).parent
     assert package.is_relative_to(environment)
     assert (package / "py.typed").is_file()
-    for kind in ("networks", "personas", "egos", "policies", "campaigns"):
+    for kind in get_args(Kind):
         there = sorted(each.stem for each in (package / "shipped" / kind).iterdir() if each.name != "README.md")
-        assert [name for name in there if name != "examples"] == [n for n in shipped_names(kind) if n != "examples"]
+        assert [name for name in there if name != "examples"] == shipped_names(kind)
+    policies = (package / "shipped" / "policies").rglob("policy.safetensors")
+    assert sorted(f"{each.parts[-3]}/{each.parts[-2]}" for each in policies) == shipped_policies()
+
+
+def test_wheel__shipped_policies_have_names(environment: Path, tmp_path: Path) -> None:
+    code = "gymnasium.make('harness:harness/Ego-v0', other='merge/speedy-seed1', other_persona='speedy').reset(seed=1)"
+    python(environment, tmp_path, f"import gymnasium; {code}")
+    campaign = TWO_GAMES.replace("[ego]", '[ego]\ndriver = "merge/naive-seed1"')
+    (tmp_path / "named.toml").write_text(campaign, encoding="utf-8")
+    run(environment, tmp_path, "harness", "check", "named.toml")
 
 
 def test_wheel__the_command_says_its_version(environment: Path, tmp_path: Path) -> None:

@@ -169,7 +169,7 @@ def _is_tunable(driver: ExternalDriver | None) -> bool:
 def _find_named(file: Path, key: str, written: str, kind: Kind) -> Path:
     """A document that a campaign names. Raises UsageError if a name is that of no document."""
     found = find_document(written, file.parent, kind)
-    if is_name(written) and not os.path.exists(found):
+    if is_name(written, kind) and not os.path.exists(found):
         raise UsageError.of(file, key, *missing_document(written, file.parent, kind))
     return found
 

@@ -170,7 +170,11 @@ def columns(
 def check_driver(
     driver: Annotated[
         str,
-        typer.Argument(metavar="DRIVER", help="A driver document, a policy's folder, an installed driver, or sumo."),
+        typer.Argument(
+            metavar="DRIVER",
+            help="A driver document, a policy's folder, the name of an installed or shipped driver or of a shipped "
+            "policy (merge/naive-seed1), or sumo.",
+        ),
     ],
     scene: Annotated[Path, typer.Option(metavar="DIR", help="The scene of the games, a folder or a name.")] = Path(
         "merge"
@@ -195,7 +199,11 @@ def check_driver(
 @policy_app.command("export")
 def export_policy(
     driver: Annotated[
-        str, typer.Argument(metavar="DRIVER", help="A policy's folder, or a driver document of kind stable_baselines3.")
+        str,
+        typer.Argument(
+            metavar="DRIVER",
+            help="A policy's folder, a shipped policy (merge/naive-seed1), or a document of kind stable_baselines3.",
+        ),
     ],
     out: Annotated[Path, typer.Argument(metavar="FILE", help="The new file: .onnx, or .pt for TorchScript.")],
     allow_code: AllowCode = False,

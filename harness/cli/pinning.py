@@ -84,7 +84,9 @@ def regression(
     ego: Annotated[
         str,
         typer.Option(
-            metavar="DRIVER", help="The ego: the folder of a policy, a driver document, an installed driver, or sumo."
+            metavar="DRIVER",
+            help="The ego: the folder of a policy, a driver document, the name of an installed or shipped driver or of "
+            "a shipped policy (merge/naive-seed1), or sumo.",
         ),
     ],
     junit: Annotated[Path | None, typer.Option(metavar="FILE", help="Also write the results as JUnit XML.")] = None,

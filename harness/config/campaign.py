@@ -36,7 +36,7 @@ class Ego(Document):
 
     driver: DocumentPath = LEARNED
     """`learned`: trained by the campaign. `sumo`: SUMO's own models. Else the folder of a policy, a driver document, or
-    the name of an installed or shipped driver."""
+    the name of an installed driver, of a shipped one, or of a shipped policy (`merge/naive-seed1`)."""
     persona: DocumentPath = "careful"
     """The persona of the ego, which gives its payoff."""
 
@@ -92,7 +92,7 @@ class CrossPlay(Document):
     """Games of every ego of the campaign against every non-ego."""
 
     egos: list[DocumentPath] = Field([], max_length=50)
-    """Further egos, as in `[ego] driver`: `sumo`, a driver document or the folder of a policy."""
+    """Further egos, as in `[ego] driver`: `sumo`, a driver document, or the folder or name of a policy."""
 
 
 class Assessment(Document):

@@ -3,6 +3,7 @@
 | in the campaign | is |
 | --- | --- |
 | `driver = "policies/naive-seed1"` | the folder of a policy |
+| `driver = "merge/naive-seed1"` | a shipped policy |
 | `driver = "egos/adas.toml"` | a driver document, see `harness.config.driver` |
 | `driver = "adas"` | a shipped driver document |
 | `driver = "my_driver"` | an installed package's entry point, see `harness.drivers.entry_points` |
@@ -53,7 +54,7 @@ from harness.drivers.policy_file import check_no_archive, policy_files, read_pol
 from harness.drivers.protocol import Driver
 from harness.errors import DriverError, UsageError
 from harness.game.observation_layout import SIZE
-from harness.shipped_documents import find_document, shipped_names
+from harness.shipped_documents import find_document, is_name, shipped_names, shipped_policies
 
 ALLOW_CODE = "--allow-code"
 _RUNS_CODE = {
@@ -188,6 +189,8 @@ def find_driver(written: str, file: Path, key: str, allow_code: bool) -> Externa
     """
     installed = installed_names()
     place = resolve(file, written) if written in installed else find_document(written, file.parent, "egos")
+    if "/" in written and not os.path.exists(place):
+        place = find_document(written, file.parent, "policies")
     if os.path.isdir(place):
         read_policy(place)
         return _external(written, place, None, files=policy_files(place))
@@ -203,8 +206,10 @@ def find_driver(written: str, file: Path, key: str, allow_code: bool) -> Externa
         return _from_document(written, place, document)
     if written.endswith(".toml") or "/" in written:
         remedy = nearest_beside(place) if os.path.isdir(place.parent) else f"no folder {place.parent}"
+        if is_name(written, "policies"):
+            remedy += f"; shipped policies are {', '.join(shipped_policies())}"
         raise UsageError.of(file, key, f"{written!r}: there is no such file or folder", remedy)
-    names = [LEARNED, SUMO, *installed, *shipped_names("egos")]
+    names = [LEARNED, SUMO, *installed, *shipped_names("egos"), *shipped_policies()]
     if written not in names:
         remedy = nearest(written, names) + "; or name a driver document or the folder of a policy"
         raise UsageError.of(file, key, f"there is no driver {written!r}", remedy)

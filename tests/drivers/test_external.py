@@ -21,6 +21,7 @@ from harness.config.toml_reading import tomllib
 from harness.drivers.external import ALLOW_CODE
 from harness.drivers.policy_file import write_policy
 from harness.errors import UsageError
+from harness.shipped_documents import shipped, shipped_policies
 from tests.support.external_drivers import document, find, install, problems
 from tests.support.policies import some_policy
 from tests.support.repository import REPOSITORY
@@ -76,6 +77,22 @@ def test_find__a_missing_path_gets_the_nearest_as_remedy(tmp_path: Path) -> None
     document(tmp_path, "", "idm.toml")
     assert "'imd.toml': there is no such file or folder (did you mean 'idm.toml'?)" in refusal("imd.toml", tmp_path)
     assert "no folder" in refusal("nowhere/idm.toml", tmp_path)
+
+
+def test_find__a_shipped_policy_has_a_name_in_every_folder(tmp_path: Path) -> None:
+    assert find("merge/naive-seed1", tmp_path).place == shipped("policies") / "merge" / "naive-seed1"
+    campaign = open_campaign(write_campaign(tmp_path, ego=ego("merge/naive-seed1")))
+    assert campaign.ego_driver == find("merge/naive-seed1", tmp_path)
+    own = tmp_path / "policies" / "merge" / "naive-seed1"
+    write_policy(some_policy(), own)
+    assert find("merge/naive-seed1", tmp_path).place == own
+
+
+@pytest.mark.parametrize("written", ["merge/naive-seed2", "mine/naive-seed1", "qqq"])
+def test_find__an_unknown_policy_gets_the_shipped_ones_as_remedy(written: str, tmp_path: Path) -> None:
+    told = refusal(written, tmp_path)
+    assert all(name in told for name in shipped_policies())
+    assert len(shipped_policies()) == 5
 
 
 @pytest.mark.parametrize(

@@ -229,6 +229,8 @@ def test_names__are_found_from_any_working_directory(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     opened(DrivingEnv, scene="merge", persona="speedy").reset(seed=1)
+    name = "harness:harness/Ego-v0"
+    opened(gymnasium.make, name, other="merge/speedy-seed1", other_persona="speedy").reset(seed=1)
 
 
 def test_garbage__an_environment_that_was_not_closed_closes_sumo() -> None:
