@@ -151,7 +151,7 @@ class SavedPolicy(NamedTuple):
 
 def read_sb3_policy(document: StableBaselines3, file: Path, normalize: Path | None) -> SavedPolicy:
     """The policy in a file. Raises UsageError if it can't be read, if another algorithm saved it, if its spaces are not
-    those of a driver, and if it learned from normalised observations and `normalize` is not given."""
+    those of a driver, and if it learned under `VecNormalize` and `normalize` is not given."""
     saved, named = _saved_by(file), document.algorithm
     if saved not in (None, named) and {saved, named} not in _ALIKE:
         known = StableBaselines3.model_fields["algorithm"].annotation.__args__  # type: ignore[union-attr]
@@ -163,9 +163,9 @@ def read_sb3_policy(document: StableBaselines3, file: Path, normalize: Path | No
         raise UsageError.of(file, "algorithm", message, 'algorithm = "RecurrentPPO"')
     gives_index = _check_spaces(document, file, model)
     scaling = _read_scaling(normalize) if normalize is not None else None
-    if scaling is None and _learned_normalised(model):
-        message = "it learned from observations that VecNormalize scaled, so that it can't drive by others"
-        remedy = 'name the file that VecNormalize.save wrote: normalize = "vn.pkl"'
+    if scaling is None and _learned_under_scaling(model):
+        message = "it learned under VecNormalize, whose file says whether and how observations were scaled"
+        remedy = 'name what VecNormalize.save wrote, with norm_obs=False too: normalize = "vn.pkl"'
         raise UsageError.of(file, "normalize", message, remedy)
     return SavedPolicy(model.policy, scaling, gives_index)
 
@@ -185,9 +185,10 @@ def _saved_by(file: Path) -> str | None:
     return next(iter([*families, *(name for name, keys in _SIGNS if keys <= data.keys())]), None)
 
 
-def _learned_normalised(model: Any) -> bool:
-    """Whether a model learned from observations that `VecNormalize` scaled: its last one is out of the bounds of its
-    observation space, or it kept the unscaled one beside it. (Algorithms with a replay buffer always keep two.)"""
+def _learned_under_scaling(model: Any) -> bool:
+    """Whether a model learned under `VecNormalize`: its last observation is out of the bounds of its observation space,
+    or it kept the unscaled one beside it. (Algorithms with a replay buffer always keep two.) With `norm_obs=False` only
+    rewards were scaled, which nothing in the model's file tells."""
     last = getattr(model, "_last_obs", None)
     if not hasattr(model, "replay_buffer_class") and getattr(model, "_last_original_obs", None) is not None:
         return True

@@ -236,8 +236,20 @@ def test_normalised__sees_what_it_learned_from(name: str, normalised: tuple[dict
 
 @pytest.mark.parametrize("name", ["PPO", "SAC"])
 def test_normalised__is_refused_without_the_scaling(name: str, normalised: tuple[dict[str, Path], Path]) -> None:
-    with pytest.raises(UsageError, match="learned from observations that VecNormalize scaled"):
+    with pytest.raises(UsageError, match=r"learned under VecNormalize.*norm_obs=False"):
         Sb3Driver(document(name), normalised[0][name], sampled=False)
+
+
+@pytest.mark.parametrize(("name", "settings"), [("PPO", {"n_steps": 16, "batch_size": 16}), ("SAC", {})])
+def test_normalised__rewards_alone_leave_observations_as_they_are(
+    name: str, settings: dict[str, Any], tmp_path: Path
+) -> None:
+    env = VecNormalize(DummyVecEnv([Recorded]), norm_obs=False)
+    file, scaling = save(name, "MlpPolicy", env, tmp_path, steps=16, **settings), tmp_path / "vn.pkl"
+    env.save(str(scaling))
+    expected, _ = algorithm(name).load(file, device="cpu").predict(SEEN, deterministic=True)
+    driver = Sb3Driver(document(name, normalize="vn.pkl"), file, sampled=False, normalize=scaling)
+    np.testing.assert_allclose(driver.decide(GAMES, SEEN, NOISE), expected, atol=1e-6)
 
 
 class Trap:
