@@ -47,11 +47,27 @@ class Results:
     def table(self, name: str) -> pd.DataFrame:
         """A table of the run, by the name of its CSV file: `table("manoeuvres")`.
 
-        Names of columns end with their units. Raises UsageError if the run has no such table.
+        `harness columns` describes the columns; their names end with their units. Raises UsageError, which lists the
+        tables of the run, if it has no such table.
         """
         from harness.evaluation.tables import read_csv
 
+        tables = sorted(each.stem for each in self.path.glob("*.csv"))
+        if name not in tables:
+            raise UsageError.of(self.path, f"table {name!r}", "is none of this run", f"tables: {', '.join(tables)}")
         return read_csv(self.path / f"{name}.csv")
+
+    def trace(self, arm: str, seed: int, episode: int) -> pd.DataFrame:
+        """The recording of a game: a row for each road user in each step, with its pose, speed and outcome.
+
+        `harness columns` describes the columns, as `docs/columns.md` does. Raises UsageError if the run has no such
+        game, if the game could not be played, and if the folder does not contain the traces.
+        """
+        from harness.campaign.results.replay_game import find_game, read_trace
+        from harness.evaluation.trace_file import TraceReader
+
+        _, traces = find_game(RunFolder(self.path), arm, episode, seed)
+        return read_trace(traces, episode, TraceReader())
 
     @property
     def episodes(self) -> pd.DataFrame:

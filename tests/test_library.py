@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 import harness
+from harness.evaluation.trace_columns import TRACE_COLUMNS
 from tests.support.repository import REPOSITORY
-from tests.support.tiny import BY_SUMO, tables, write_campaign
+from tests.support.tiny import BY_SUMO, sumo_run, tables, write_campaign
 from tests.support.tiny import harness as command
 
 
@@ -31,8 +32,31 @@ def test_run__prints_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) 
 
 
 def test_table__a_name_that_the_run_has_not_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(harness.UsageError, match=r"none\.csv"):
-        harness.Results(tmp_path).table("none")
+    for name in ("episodes", "summary"):
+        (tmp_path / f"{name}.csv").touch()
+    refusal = "is none of this run .tables: episodes, summary"
+    for wrong in ("epsiodes", "../other/episodes"):
+        with pytest.raises(harness.UsageError, match=f"table '{wrong}': {refusal}"):
+            harness.Results(tmp_path).table(wrong)
+
+
+def test_trace__is_the_recording_of_one_game() -> None:
+    results = harness.load(sumo_run())
+    trace = results.trace("naive_vs_speedy", 1, 1)
+    assert trace.columns.tolist() == [column.name for column in TRACE_COLUMNS]
+    assert set(trace["episode"]) == {1}
+    ends = trace[trace["player"].isin(["ego", "non_ego"])].groupby("player").last()["outcome"]
+    (game,) = results.episodes.query("arm == 'naive_vs_speedy' and episode == 1").itertuples()
+    assert ends.to_dict() == {"ego": game.ego_outcome, "non_ego": game.non_ego_outcome}
+    assert trace["time_s"].max() == game.duration_s
+    for wrong, remedy in ((("naive_vs_sppedy", 1, 1), "naive_vs_speedy"), (("naive_vs_speedy", 1, 2), "0 to 1")):
+        with pytest.raises(harness.UsageError, match=remedy):
+            results.trace(*wrong)
+
+
+def test_trace__a_published_run_without_traces_is_refused() -> None:
+    with pytest.raises(harness.UsageError, match="this folder does not contain the traces"):
+        harness.load(REPOSITORY / "reports" / "merge").trace("naive_vs_speedy", 1, 23)
 
 
 def test_policies__are_shown_by_their_names_and_shapes(tmp_path: Path) -> None:

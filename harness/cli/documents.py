@@ -157,7 +157,7 @@ def schema(
 def columns(
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the page to this file.")] = None,
 ) -> None:
-    """Print what the columns of episodes.csv are, as Markdown: unit, formula and source of each."""
+    """Print what the columns of tables and traces are, as Markdown: unit, formula and source of each."""
     from harness.files import write_atomically
     from harness.reports.columns_page import columns_page
 

@@ -23,6 +23,8 @@ import pyarrow.dataset
 import pyarrow.parquet as pq
 
 from harness.errors import UsageError
+from harness.evaluation.column import COUNT, FLAG, NUMBER, TEXT
+from harness.evaluation.trace_columns import TRACE_COLUMNS
 from harness.files import check_file, replace_durably, scratch_beside
 from harness.game.arrays import FloatArray
 
@@ -32,31 +34,8 @@ MOST_KEPT_ROWS = 1_000_000
 _LARGEST, _MOST_STEPS = 1e8, 1_000_000
 
 _TEXT = pa.dictionary(pa.int32(), pa.string())
-SCHEMA = pa.schema(
-    [
-        ("episode", pa.int32()),
-        ("step", pa.int32()),
-        ("time_s", pa.float64()),
-        ("player", _TEXT),
-        ("vehicle_type", _TEXT),
-        *(
-            (name, pa.float64())
-            for name in ("x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad")
-        ),
-        ("lapsed", pa.bool_()),
-        ("steers", pa.bool_()),
-        ("station_m", pa.float64()),
-        ("payoff", pa.float64()),
-        ("outcome", _TEXT),
-        ("signals", _TEXT),
-        ("signal_s", _TEXT),
-        ("friction", pa.float64()),
-        ("limit_share", pa.float64()),
-    ]
-)
-"""A row for each road user in each step. `steers`: the harness moves the player, so that its steering is known;
-`station_m`: along its route; `payoff`: of the step; `signal_s`: at the start, seconds since the state of each signal
-link changed; `friction` and `limit_share` (the factor on speed limits) are those of the game."""
+_TYPES = {COUNT: pa.int32(), NUMBER: pa.float64(), FLAG: pa.bool_(), TEXT: _TEXT}
+SCHEMA = pa.schema([(column.name, _TYPES[column.dtype]) for column in TRACE_COLUMNS])
 
 _TEXTS = [field.name for field in SCHEMA if field.type == _TEXT]
 _NUMBERS = [field.name for field in SCHEMA if field.type == pa.float64()]

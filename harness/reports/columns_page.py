@@ -1,11 +1,12 @@
-"""The page on the columns of every table of a run, as Markdown."""
+"""The page on the columns of every table of a run and of its traces, as Markdown."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable
 
 from harness.evaluation.column import Column
 from harness.evaluation.columns import TABLES
+from harness.evaluation.trace_columns import TRACE_COLUMNS
 
 _INTRODUCTION = """# Columns
 
@@ -15,6 +16,12 @@ An empty cell means that the quantity can't be measured, never 0. `episodes.csv`
 made from the traces: `harness report RUN` makes them anew where a metric is new. Shares and rates are from 0 to 1. With
 several people, the columns of the non-ego in `episodes.csv` occur for each of them, as `non_ego_2_outcome`, and
 `ego_collided_with` names the road user that the ego touched.
+"""
+_TRACES = """
+## `traces/<arm>-seed<n>.parquet`
+
+A row for each road user in each step of every game: players, background traffic and obstacles. From Python:
+`harness.load(RUN).trace(arm, seed, episode)` is the DataFrame of one game.
 """
 _NOTES = """
 ## The measures of severity
@@ -37,12 +44,13 @@ _ORDER = ("episodes", "causes", "manoeuvres", "summary", "comparisons")
 def columns_page() -> str:
     """The page `docs/columns.md`."""
     names = [*_ORDER, *(name for name in TABLES if name not in (*_ORDER, "played"))]
-    return _INTRODUCTION + "".join(_table(name, TABLES[name]) for name in names) + _NOTES
+    tables = [f"\n## `{name}.csv`\n" + _table(TABLES[name].values()) for name in names]
+    return "".join([_INTRODUCTION, *tables, _TRACES, _table(TRACE_COLUMNS), _NOTES])
 
 
-def _table(name: str, columns: Mapping[str, Column]) -> str:
-    head = f"\n## `{name}.csv`\n\n| column | unit | meaning | source |\n| --- | --- | --- | --- |\n"
-    return head + "".join(_row(column) for column in columns.values())
+def _table(columns: Iterable[Column]) -> str:
+    head = "\n| column | unit | meaning | source |\n| --- | --- | --- | --- |\n"
+    return head + "".join(map(_row, columns))
 
 
 def _row(column: Column) -> str:

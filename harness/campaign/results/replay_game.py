@@ -150,6 +150,14 @@ def played_game(run: Path, arm: str, episode: int, seed: int | None) -> PlayedGa
     Raises UsageError if there is no such game, or it could not be played.
     """
     folder = RunFolder(run)
+    record, traces = find_game(folder, arm, episode, seed)
+    return read_game(record, traces, TraceReader(), open_scene(folder.scene))
+
+
+def find_game(folder: RunFolder, arm: str, episode: int, seed: int | None) -> tuple[Any, Path]:
+    """The row of `episodes.csv` of a game, and the file with its trace. Arguments and errors are those of
+    `played_game`."""
+    run = folder.path
     chosen_seed = folder.manifest()["seeds"][0] if seed is None else seed
     games = games_of(run, episodes_of(folder), arm, None)
     found = games[(games["episode"] == episode) & (games["seed"] == chosen_seed)]
@@ -160,16 +168,20 @@ def played_game(run: Path, arm: str, episode: int, seed: int | None) -> PlayedGa
     (record,) = found.itertuples()
     if record.error:
         raise UsageError.of(run, f"{arm} {episode}", f"could not be played: {record.error}", "choose another")
-    traces = traces_of(folder, arm, chosen_seed, episode)
-    return read_game(record, traces, TraceReader(), open_scene(folder.scene))
+    return record, traces_of(folder, arm, chosen_seed, episode)
 
 
 def read_game(record: Any, traces: Path, reader: TraceReader, scene: OpenScene) -> PlayedGame:
     """The game of a row of `episodes.csv`. Raises UsageError if its traces lack it."""
-    trace = reader.read(traces, int(record.episode))
+    return PlayedGame(record=record, trace=read_trace(traces, int(record.episode), reader), scene=scene)
+
+
+def read_trace(traces: Path, episode: int, reader: TraceReader) -> pd.DataFrame:
+    """The trace of a game. Raises UsageError if the file lacks it."""
+    trace = reader.read(traces, episode)
     if trace.empty:
-        raise UsageError.of(traces, "", f"has no trace of episode {record.episode}", "run the campaign again")
-    return PlayedGame(record=record, trace=trace, scene=scene)
+        raise UsageError.of(traces, "", f"has no trace of episode {episode}", "run the campaign again")
+    return trace
 
 
 def traces_of(folder: RunFolder, arm: str, seed: int, episode: int) -> Path:
