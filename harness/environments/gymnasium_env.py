@@ -72,7 +72,7 @@ class DrivingEnv(LiveSimulation, gymnasium.Env[Any, Any]):
     the arms of a campaign with that seed have as episode 3.
 
     Render: `rgb_array` is uint8 [320, 640, 3], the 100 m around the player from above; `human` shows the same in a
-    window, in real time at most.
+    window, in real time at most. Where no window can be opened, `metadata["render_modes"]` lacks it, and it is refused.
 
     >>> environment = DrivingEnv(other="sumo")
     >>> observation, info = environment.reset(seed=1)
@@ -113,7 +113,7 @@ class DrivingEnv(LiveSimulation, gymnasium.Env[Any, Any]):
         )
         self._player = seating.learner
         self._game = SingleGame(seating.scene, seating.seats, seating.start_distribution, render_mode)
-        self.metadata = {**self.metadata, "render_fps": round(1.0 / seating.scene.world.step_s)}
+        self.metadata = {**self.metadata, **self._game.metadata}
         self._running = False
         self.render_mode = render_mode
         self.observation_space = _observation_space()
@@ -196,7 +196,7 @@ class ParallelDrivingEnv(LiveSimulation, ParallelEnv[str, FloatArray, FloatArray
         seats = [Seat(None, each.payoff) for each in personas]
         starts = opened.start_distribution([each.human_factors for each in personas], [1.0] * len(personas))
         self._game = SingleGame(opened, seats, starts, render_mode)
-        self.metadata = {**self.metadata, "render_fps": round(1.0 / opened.world.step_s)}
+        self.metadata = {**self.metadata, **self._game.metadata}
         self._generator: np.random.Generator | None = None
         self.render_mode = render_mode
         self.possible_agents = list(self._roles)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from typing import Any
 
 import numpy as np
 from PIL import Image, ImageDraw
 
-from harness.errors import UsageError
 from harness.game.arrays import FloatArray
 from harness.game.state import Bodies
 from harness.road.net.network import read_net
@@ -74,20 +75,29 @@ def _corners(bodies: Bodies, game: int, body: int) -> FloatArray:
     return np.array([x_m, y_m]) + np.array([along + across, along - across, -along - across, -along + across])
 
 
+def can_open_window() -> bool:
+    """Whether there is a screen, and a backend of matplotlib that opens windows on it."""
+    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        return False  # known without the import
+    import matplotlib.pyplot as plt
+    from matplotlib.backends.registry import backend_registry
+
+    backend = plt.get_backend()
+    try:
+        plt.switch_backend(backend)  # loads it: one that MPLBACKEND names may not be installed
+    except ImportError:
+        return False
+    return backend_registry.resolve_backend(backend)[1] is not None
+
+
 class Window:
     """A window that shows pictures, by matplotlib's interactive backends."""
 
     def __init__(self, title: str) -> None:
-        """Raises UsageError if there is no screen, or no backend that can open a window."""
         import matplotlib.pyplot as plt
 
         self._plt: Any = plt
         self._figure, axes = plt.subplots(figsize=(SIZE_PX[0] / 100, SIZE_PX[1] / 100), dpi=100, num=title)
-        if self._figure.canvas.required_interactive_framework is None:
-            self.close()
-            message = f"matplotlib can't open a window: its backend is {plt.get_backend()}"
-            remedy = "use a screen with Tk or Qt (apt-get install python3-tk, pip install PySide6), or rgb_array"
-            raise UsageError.of("render_mode", "human", message, remedy)
         self._figure.subplots_adjust(0, 0, 1, 1)
         axes.set_axis_off()
         self._shown = axes.imshow(np.zeros((SIZE_PX[1], SIZE_PX[0], 3), dtype=np.uint8))

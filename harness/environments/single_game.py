@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 Info: TypeAlias = dict[str, Any]
 RENDER_MODES = ("rgb_array", "human")
+"""Of the environments; those of a machine without a screen lack "human"."""
 _OPTIONS = ("episode", "campaign_seed")  # of `reset`
 
 
@@ -39,11 +40,16 @@ class SingleGame:
         start_distribution: StartDistribution,
         render_mode: str | None,
     ) -> None:
-        """Load SUMO. Raises UsageError if there is no such render mode, SimulationError if SUMO can't load the
-        scene."""
+        """Load SUMO. Raises UsageError if there is no such render mode, or no window for it; SimulationError if SUMO
+        can't load the scene."""
+        self.metadata: dict[str, Any] = {"render_modes": _render_modes(), "render_fps": round(1.0 / scene.world.step_s)}
         if render_mode not in (None, *RENDER_MODES):
             remedy = f"one of {', '.join(RENDER_MODES)}"
             raise UsageError.of("environment", "render_mode", f"is {render_mode!r}", remedy)
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            message = f"is {render_mode!r}, and matplotlib can't open a window here"
+            remedy = "use a screen with Tk or Qt (apt-get install python3-tk, pip install PySide6), or rgb_array"
+            raise UsageError.of("environment", "render_mode", message, remedy)
         self._scene, self._start_distribution, self._render_mode = scene, start_distribution, render_mode
         self._picture: ScenePicture | None = None
         self._window: Window | None = None
@@ -138,6 +144,12 @@ class SingleGame:
             "speed_mps": float(state.speed_mps[0, player]),
             "time_s": float(state.step[0]) * self.arena.world.step_s,
         }
+
+
+def _render_modes() -> list[str]:
+    from harness.environments.scene_picture import can_open_window
+
+    return [mode for mode in RENDER_MODES if mode != "human" or can_open_window()]
 
 
 def _named_game(options: Mapping[str, Any]) -> tuple[str | int, ...]:

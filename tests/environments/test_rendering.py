@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Any
 
 import gymnasium
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from gymnasium.wrappers import RenderCollection
@@ -64,7 +65,7 @@ environment.reset(seed=1)
 for _ in range(3):
     environment.step(np.zeros(2))
 import matplotlib.pyplot as plt
-print(plt.get_backend().lower(), len(plt.get_fignums()), environment.render())
+print(plt.get_backend().lower(), len(plt.get_fignums()), environment.render(), environment.metadata["render_modes"])
 environment.close()
 print(len(plt.get_fignums()))
 """
@@ -80,14 +81,20 @@ def test_human__shows_the_game_in_a_window_until_it_is_closed() -> None:
         variables = {**os.environ, "DISPLAY": display, "MPLBACKEND": "tkagg", "PYTHONPATH": str(REPOSITORY)}
         done = subprocess.run([sys.executable, "-c", HUMAN], env=variables, capture_output=True, text=True, timeout=300)
     assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.splitlines() == ["tkagg 1 None", "0"]
+    assert done.stdout.splitlines() == ["tkagg 1 None ['rgb_array', 'human']", "0"]
 
 
-def test_human__without_a_screen_says_what_to_do(opened: Open, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("MPLBACKEND", "agg")
-    environment = opened(DrivingEnv, render_mode="human")
+@pytest.mark.parametrize("make", [DrivingEnv, ParallelDrivingEnv])
+@pytest.mark.parametrize("display", ["", ":0"])
+def test_human__is_neither_declared_nor_accepted_without_a_window(
+    opened: Open, make: Open, display: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DISPLAY", display)
+    monkeypatch.setenv("WAYLAND_DISPLAY", "")
+    monkeypatch.setattr(plt, "get_backend", lambda: "agg")  # it opens no windows on any display
+    assert opened(make).metadata["render_modes"] == ["rgb_array"]
     with pytest.raises(UsageError, match=r"can't open a window.*rgb_array"):
-        environment.reset(seed=1)
+        make(render_mode="human")
 
 
 def test_render__needs_a_mode_and_a_game(opened: Open) -> None:
