@@ -13,9 +13,11 @@ import stat
 import tempfile
 from collections.abc import Collection
 from pathlib import Path
+from typing import IO
 
 _SCRATCH = ".part"
-_MOST_HASHED_BYTES = 1_000_000_000
+MOST_HASHED_BYTES = 2_000_000_000
+_BLOCK_BYTES = 1_000_000
 
 
 def write_atomically(path: Path, content: bytes) -> None:
@@ -84,12 +86,7 @@ def check_file(path: Path, most_bytes: int) -> None:
 
 def content_of(path: Path, most_bytes: int) -> bytes:
     """The bytes of a plain file. Raises OSError, with the reason in its `strerror`, for any other or larger file."""
-    check_file(path, most_bytes)
-    # the path may have been replaced since: opening a pipe without a writer must not block
-    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
-    with os.fdopen(descriptor, "rb") as file:
-        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-            raise OSError(errno.EINVAL, "is not a plain file", str(path))
+    with _plain_file(path, most_bytes) as file:
         content = file.read(most_bytes + 1)
     if len(content) > most_bytes:
         raise OSError(errno.EFBIG, _too_large(len(content), most_bytes), str(path))
@@ -97,8 +94,25 @@ def content_of(path: Path, most_bytes: int) -> bytes:
 
 
 def digest_of_file(path: Path) -> str:
-    """SHA-256 of a plain file's content. Raises OSError as `content_of` does, and for more than 1 GB."""
-    return hashlib.sha256(content_of(path, _MOST_HASHED_BYTES)).hexdigest()
+    """SHA-256 of a plain file's content, read in blocks. Raises OSError as `content_of` does, and for more than
+    `MOST_HASHED_BYTES`."""
+    digest = hashlib.sha256()
+    with _plain_file(path, MOST_HASHED_BYTES) as file:
+        while block := file.read(_BLOCK_BYTES):
+            digest.update(block)
+            if file.tell() > MOST_HASHED_BYTES:  # it grows while it is read
+                raise OSError(errno.EFBIG, _too_large(file.tell(), MOST_HASHED_BYTES), str(path))
+    return digest.hexdigest()
+
+
+def _plain_file(path: Path, most_bytes: int) -> IO[bytes]:
+    check_file(path, most_bytes)
+    # the path may have been replaced since: opening a pipe without a writer must not block
+    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise OSError(errno.EINVAL, "is not a plain file", str(path))
+    return os.fdopen(descriptor, "rb")
 
 
 def has_digest(path: Path, digests: Collection[str]) -> bool:

@@ -1,13 +1,15 @@
-"""Atomic writing of files."""
+"""Atomic writing and bounded reading of files."""
 
 from __future__ import annotations
 
+import hashlib
 import os
+import tracemalloc
 from pathlib import Path
 
 import pytest
 
-from harness.files import write_atomically
+from harness.files import digest_of_file, write_atomically
 
 
 def test_write_atomically__writes_and_replaces(tmp_path: Path) -> None:
@@ -36,3 +38,16 @@ def test_write_atomically__a_failure_leaves_only_the_old_file(tmp_path: Path, mo
 def test_write_atomically__a_missing_folder_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         write_atomically(tmp_path / "nowhere" / "table.csv", b"")
+
+
+def test_digest_of_file__reads_in_blocks(tmp_path: Path) -> None:
+    file = tmp_path / "weights.bin"
+    file.touch()
+    os.truncate(file, 30_000_000)
+    tracemalloc.start()
+    try:
+        digest = digest_of_file(file)
+        assert tracemalloc.get_traced_memory()[1] < 5_000_000
+    finally:
+        tracemalloc.stop()
+    assert digest == hashlib.sha256(bytes(30_000_000)).hexdigest()

@@ -6,7 +6,6 @@ document has problems of its own.
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -23,6 +22,7 @@ from harness.config.campaign import LEARNED, SUMO, Campaign, DocumentPath, Ego
 from harness.config.persona import Persona
 from harness.config.toml_reading import Document, read_document
 from harness.drivers.car import car_of
+from harness.drivers.driver_files import sha256_of
 from harness.drivers.external import ExternalDriver, find_driver
 from harness.errors import Problem, UsageError, collect
 from harness.game.roles import EGO
@@ -158,7 +158,7 @@ def open_campaign(
         policies=policies,
         other_egos=other_egos,
         policy_drivers=policy_drivers,
-        hashes={_relative(file, each): hashlib.sha256(each.read_bytes()).hexdigest() for each in files},
+        hashes={_relative(file, each): sha256_of(each) for each in files},
     )
 
 

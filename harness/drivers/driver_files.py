@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
+import errno
 import os
 import shutil
 from pathlib import Path
@@ -11,6 +11,7 @@ from harness.config.campaign import resolve
 from harness.config.driver import Onnx, Process, Python, WithFiles
 from harness.config.toml_reading import nearest
 from harness.errors import UsageError
+from harness.files import digest_of_file
 
 
 def find_program(name: str, folder: Path, document: Path) -> Path:
@@ -69,8 +70,10 @@ def nearest_beside(path: Path) -> str:
 
 
 def sha256_of(path: Path) -> str:
-    """SHA-256 of a file's content. Raises UsageError if it can't be read."""
+    """SHA-256 of a file's content. Raises UsageError if it can't be read or is larger than `MOST_HASHED_BYTES`."""
     try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
+        return digest_of_file(path)
     except OSError as error:
+        if error.errno == errno.EFBIG:
+            raise UsageError.of(path, "", str(error.strerror), "name a smaller file") from None
         raise UsageError.of(path, "", f"cannot be read: {error}", "correct its permissions") from None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import json
+import os
 import re
 import shutil
 from pathlib import Path
@@ -157,6 +158,18 @@ def test_find__files_of_every_kind_are_relative_to_the_document_and_hashed(
     assert "files: 'wieghts.bin': there is no such file (did you mean 'weights.bin'?)" in refusal(
         "egos/mine.toml", tmp_path
     )
+
+
+@pytest.mark.parametrize(
+    "text", ['kind = "python"\nentry_point = "steady"\nfiles = ["large.bin"]', 'kind = "fmu"\nfile = "large.bin"']
+)
+def test_find__a_file_of_more_than_2_gb_is_refused(text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    install(tmp_path / "site")
+    monkeypatch.syspath_prepend(tmp_path / "site")
+    (tmp_path / "large.bin").touch()
+    os.truncate(tmp_path / "large.bin", 8_000_000_000)  # sparse: it takes no room on the disk
+    message = refusal(document(tmp_path, text), tmp_path)
+    assert message.endswith("large.bin: is too large: 8,000 MB, at most 2,000 MB are read (name a smaller file)")
 
 
 def test_find__a_parameter_that_is_the_path_of_a_file_is_hashed(
