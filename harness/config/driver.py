@@ -139,6 +139,10 @@ class Onnx(Network):
     """The input that receives the observation; none: the only input that is not called `noise`."""
     output: VariableName | None = None
     """The output with the decision; none: the first."""
+    deadline_s: DeadlineS = 10.0
+    """Longest time of a decision. It only detects networks that hang: a busy machine must not change a game."""
+    start_deadline_s: DeadlineS = 60.0
+    """Longest time of loading."""
 
 
 class TorchScript(Network):

@@ -10,6 +10,7 @@ from pathlib import Path
 from harness.config.campaign import resolve
 from harness.config.driver import Onnx, Process, Python, WithFiles
 from harness.config.toml_reading import nearest
+from harness.drivers.onnx_network import external_files
 from harness.errors import UsageError
 from harness.files import digest_of_file
 
@@ -27,7 +28,7 @@ def find_program(name: str, folder: Path, document: Path) -> Path:
 
 def files_of(place: Path, document: WithFiles) -> list[Path]:
     """The files that a document at `place` names, each once: under a key of its own, under `files`, and as parameters
-    that are paths of files. Raises UsageError for a missing one."""
+    that are paths of files, and those that an ONNX file names. Raises UsageError for a missing one."""
     folder = place.parent
     named = [*document.named_files.items(), *(("files", each) for each in document.files)]
     for key, file in named:
@@ -35,8 +36,8 @@ def files_of(place: Path, document: WithFiles) -> list[Path]:
             message = f"{file!r}: there is no such file"
             raise UsageError.of(place, key, message, nearest_beside(resolve_in(folder, file)))
     found = [resolve_in(folder, file) for _, file in named]
-    if isinstance(document, Onnx):  # exporters put large weights into a file beside it
-        found += [each for each in (path.with_name(f"{path.name}.data") for path in found) if each.is_file()]
+    if isinstance(document, Onnx):
+        found += external_files(document, resolve_in(folder, document.file))
     if isinstance(document, Process | Python):
         texts = [each for each in document.parameters.values() if isinstance(each, str) and each]
         # A package reads them relative to the working folder, a program relative to its own.

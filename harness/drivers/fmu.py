@@ -24,6 +24,7 @@ from harness.drivers.fmu_variables import ENTRY_TYPES, REALS, Value, value_for
 from harness.drivers.process import ProcessDriver
 from harness.errors import Problem, UsageError
 from harness.game.observation_layout import LAYOUT
+from harness.shipped_documents import PACKAGE
 
 ENTRY_OF = {name.replace("@", "_"): name for name in LAYOUT} | {name: name for name in LAYOUT}
 """Possible names of an FMU's inputs, and the entry of each. Most tools do not allow `@` in a name: `_` replaces it."""
@@ -37,7 +38,6 @@ _ALIKE = 0.8
 _MOST_SHOWN = 10  # problems, or names in a note
 _UNITS = {"mps": {"m": 1, "s": -1}, "mps2": {"m": 1, "s": -2}, "m": {"m": 1}, "rad": {"rad": 1}}
 _SI = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
-_CHECKOUT = Path(__file__).resolve().parents[2]
 
 
 class Wiring(NamedTuple):
@@ -57,7 +57,7 @@ def fmu_driver(document: Fmu, file: Path, car: Car) -> ProcessDriver:
     spec = json.dumps({"file": str(file), "wiring": wiring(document, file), "step_s": car.step_s})
     return ProcessDriver(
         [sys.executable, "-m", "harness.drivers.fmu_program", spec],
-        _CHECKOUT,
+        PACKAGE.parent,
         car,
         units="si",
         deadline_s=document.deadline_s,

@@ -1,12 +1,11 @@
 """A network in a file as a driver: ONNX, run by ONNX Runtime, or TorchScript, run by PyTorch.
 
-An ONNX file is data: its graph has operators of the standard only, and reads no file but its own weights. A TorchScript
-file contains a program and is code (`drivers.external`).
+An ONNX file is data (`drivers.onnx_network`). A TorchScript file contains a program and is code (`drivers.external`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -14,13 +13,11 @@ import numpy as np
 
 from harness.config.driver import Onnx, TorchScript
 from harness.drivers.car import Car
+from harness.drivers.onnx_network import OnnxNetwork
 from harness.drivers.policy_file import ACTIONS
 from harness.errors import DriverError, UsageError
 from harness.game.arrays import FloatArray, IntArray
-from harness.game.observation_layout import SIZE
 
-NOISE = "noise"
-"""The name of an input of an ONNX file that receives the noise."""
 Network: TypeAlias = Callable[[FloatArray, FloatArray], Any]
 """Outputs for observations [N, SIZE] and noise [N, 2]."""
 
@@ -67,56 +64,7 @@ class NetworkDriver:
 
 def read_network(document: Onnx | TorchScript, file: Path) -> Network:
     """The function in a file. Raises UsageError if it can't be read or does not fit."""
-    return _onnx(document, file) if isinstance(document, Onnx) else _torchscript(file)
-
-
-def _onnx(document: Onnx, file: Path) -> Network:
-    try:
-        import onnxruntime
-    except ImportError:
-        message = "ONNX files need ONNX Runtime, which is not installed"
-        raise UsageError.of(file, "", message, "pip install 'safedriverl-harness[onnx]'") from None
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = options.inter_op_num_threads = 1  # small networks: threads would wait
-    options.log_severity_level = 3
-    try:
-        session = onnxruntime.InferenceSession(str(file), options, providers=["CPUExecutionProvider"])
-    except Exception as error:  # its exceptions have no base of their own
-        what = " ".join(f"can't be read as an ONNX file: {error}".split())[:500]
-        raise UsageError.of(file, "", what, "export it again, with operators of the standard only") from None
-    inputs = {each.name: each for each in session.get_inputs()}
-    outputs = [each.name for each in session.get_outputs()]
-    seen, output = _names(document, file, inputs, outputs)
-    kind = np.float64 if inputs[seen].type == "tensor(double)" else np.float32
-    one_by_one = inputs[seen].shape[0] == 1
-
-    def run(observation: FloatArray, noise: FloatArray) -> Any:
-        feed = {seen: observation.astype(kind)}
-        if NOISE in inputs:
-            feed[NOISE] = noise.astype(np.float64 if inputs[NOISE].type == "tensor(double)" else np.float32)
-        if not one_by_one:
-            return session.run([output], feed)[0]
-        games = ({name: values[k : k + 1] for name, values in feed.items()} for k in range(len(observation)))
-        return np.concatenate([session.run([output], each)[0] for each in games])
-
-    return run
-
-
-def _names(document: Onnx, file: Path, inputs: Mapping[str, Any], outputs: list[str]) -> tuple[str, str]:
-    """The input for the observation, and the output. Raises UsageError if the document or the file leaves them open."""
-    wanted = [name for name in inputs if name != NOISE]
-    for key, name, known in (("input", document.input, wanted), ("output", document.output, outputs)):
-        if name is not None and name not in known:
-            raise UsageError.of(file, key, f"it has no {key} {name!r}", f"it has {', '.join(known) or 'none'}"[:500])
-    if len(wanted) != 1:
-        what = f"it has {len(wanted)} inputs beside the noise: {', '.join(wanted)}"[:500]
-        raise UsageError.of(file, "input", what, f"export it with one input [games, {SIZE}]; a state is not supported")
-    shape, kind = inputs[wanted[0]].shape, inputs[wanted[0]].type
-    floats = ("tensor(float)", "tensor(double)")
-    if len(shape) != 2 or (isinstance(shape[1], int) and shape[1] != SIZE) or kind not in floats:
-        what = f"its input {wanted[0]} is {kind} {shape}, not tensor(float) [games, {SIZE}]"
-        raise UsageError.of(file, "input", what, "the observation is that of harness/Ego-v0")
-    return wanted[0], document.output or outputs[0]
+    return OnnxNetwork(document, file) if isinstance(document, Onnx) else _torchscript(file)
 
 
 def _torchscript(file: Path) -> Network:

@@ -14,37 +14,22 @@ the next game starts a new process. The program is killed with its driver and wi
 from __future__ import annotations
 
 import json
-import os
-import selectors
-import signal
-import subprocess
 import sys
-import time
-import weakref
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from pathlib import Path
 from types import MappingProxyType
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 
 from harness.drivers.car import Car
+from harness.drivers.running_program import NoAnswer, Program
 from harness.errors import DriverError
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.observation_layout import LAYOUT
 
 PROTOCOL = 2
-_LONGEST_ANSWER_BYTES = 10_000_000
 _LONGEST_ERROR = 600
-_STDERR_TAIL_BYTES, _STDERR_TAIL_LINES = 4_000, 5
-# If the harness is killed, a program that never reads its input would keep running. On Linux the kernel kills the
-# program with the thread that started it. (1 is PR_SET_PDEATHSIG.)
-_DIE_WITH_PARENT = (
-    "import ctypes, os, signal, sys; parent = int(sys.argv[1]); ctypes.CDLL(None).prctl(1, signal.SIGKILL)\n"
-    "if os.getppid() != parent: sys.exit(1)\n"
-    "os.execvp(sys.argv[2], sys.argv[2:])"
-)
 
 
 class ProcessDriver:
@@ -78,13 +63,13 @@ class ProcessDriver:
         }
         if parameters:
             self._hello["parameters"] = dict(parameters)
-        self._program: _Program | None = None
+        self._program: Program | None = None
 
     def reset(self, games: IntArray) -> None:
         """Reset games [N]. Raises DriverError if the program can't be started or does not support the protocol."""
         if self._program is None or not self._program.is_running:
             self.close()
-            self._program = _Program(self._command, self._folder)
+            self._program = Program(self._command, self._folder)
             answer = self._request(self._hello, self._start_deadline_s)
             if answer.get("protocol") != PROTOCOL:
                 raise self._failure(f"does not support protocol {PROTOCOL}: it answered hello with {_short(answer)}")
@@ -117,7 +102,7 @@ class ProcessDriver:
             answer = json.loads(self._program.request(line, deadline_s))
         except (ValueError, RecursionError) as error:
             raise self._failure(f"sent an answer to {message['type']} that is not JSON: {error}") from None
-        except _NoAnswer as error:
+        except NoAnswer as error:
             raise self._failure(f"{error} (message: {message['type']})") from None
         if not isinstance(answer, dict):
             raise self._failure(f"answered {message['type']} with {_short(answer)}, not with an object")
@@ -131,118 +116,6 @@ class ProcessDriver:
         tail = self._program.stderr_tail()
         self.close()
         return DriverError(f"{self._name} {what}" + (f"; on its standard error: {tail}" if tail else ""))
-
-
-class _NoAnswer(Exception):
-    """A program gave no answer in time, or more than one."""
-
-
-class _Program:
-    """A running program. No read or write on its pipes blocks beyond a deadline."""
-
-    def __init__(self, command: Sequence[str], folder: Path) -> None:
-        wrapper = [sys.executable, "-I", "-S", "-c", _DIE_WITH_PARENT, str(os.getpid())]
-        prefix = wrapper if sys.platform == "linux" else []
-        pipe = subprocess.PIPE
-        try:
-            self._process = subprocess.Popen(
-                [*prefix, *command], cwd=folder, start_new_session=True, stdin=pipe, stdout=pipe, stderr=pipe
-            )
-        except OSError as error:
-            raise DriverError(f"{command[0]} can't be started: {error}") from None
-        self._kill = weakref.finalize(self, _kill, self._process)
-        self._stdin, self._stdout, self._stderr = _pipes(self._process)
-        self._selector = selectors.DefaultSelector()
-        for stream in (self._stdin, self._stdout, self._stderr):
-            os.set_blocking(stream.fileno(), False)
-        self._selector.register(self._stdout, selectors.EVENT_READ)
-        self._selector.register(self._stderr, selectors.EVENT_READ)
-        self._told = b""
-
-    @property
-    def is_running(self) -> bool:
-        return self._kill.alive and self._process.poll() is None
-
-    def request(self, message: bytes, deadline_s: float) -> bytes:
-        """Send a line, and receive one. Raises _NoAnswer if the program does not answer within `deadline_s`."""
-        if self._stdout in self._ready(0.0):
-            raise _NoAnswer("answered before the message was sent" if self.is_running else self._exit_description())
-        until, left, answer = time.monotonic() + deadline_s, memoryview(message), bytearray()
-        self._selector.register(self._stdin, selectors.EVENT_WRITE)
-        try:
-            while not answer.endswith(b"\n"):
-                ready = self._ready(until - time.monotonic())
-                if not ready and time.monotonic() >= until:
-                    raise _NoAnswer(f"did not answer within {deadline_s:g} s")
-                if self._stderr in ready:
-                    self._read_stderr()
-                if self._stdin in ready:
-                    left = left[os.write(self._stdin.fileno(), left[:65536]) :]
-                    if not left:
-                        self._unregister(self._stdin)
-                if self._stdout in ready:
-                    some = os.read(self._stdout.fileno(), 65536)
-                    if not some:
-                        raise _NoAnswer(self._exit_description())
-                    answer += some
-                    if len(answer) > _LONGEST_ANSWER_BYTES:
-                        raise _NoAnswer(f"answers with more than {_LONGEST_ANSWER_BYTES:,} bytes")
-        except BrokenPipeError:
-            raise _NoAnswer(self._exit_description()) from None
-        finally:
-            self._unregister(self._stdin)
-        if left or answer.count(b"\n") > 1:
-            raise _NoAnswer("answered before the message was sent" if left else "answered with more than one line")
-        return bytes(answer)
-
-    def _ready(self, within_s: float) -> list[Any]:
-        return [key.fileobj for key, _ in self._selector.select(max(within_s, 0.0))]
-
-    def _unregister(self, stream: IO[bytes]) -> None:
-        if stream in self._selector.get_map():
-            self._selector.unregister(stream)
-
-    def stderr_tail(self) -> str:
-        """The last lines of its standard error, joined to one line."""
-        self._read_stderr()
-        lines = (line.strip() for line in self._told.decode("utf-8", "replace").split("\n"))
-        return " / ".join(line for line in lines if line)[-1000:]
-
-    def close(self) -> None:
-        self._kill()
-        self._selector.close()
-
-    def _read_stderr(self) -> None:
-        try:
-            while some := os.read(self._stderr.fileno(), 65536):
-                tail = (self._told + some)[-_STDERR_TAIL_BYTES:]
-                self._told = b"\n".join(tail.split(b"\n")[-_STDERR_TAIL_LINES - 1 :])
-            self._unregister(self._stderr)  # closed by the program
-        except (OSError, ValueError):  # nothing to read now, or closed
-            return
-
-    def _exit_description(self) -> str:
-        try:
-            code = self._process.wait(1.0)
-        except subprocess.TimeoutExpired:
-            return "closed its standard output"
-        return f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
-
-
-def _pipes(process: subprocess.Popen[bytes]) -> list[IO[bytes]]:
-    return [each for each in (process.stdin, process.stdout, process.stderr) if each is not None]
-
-
-def _kill(process: subprocess.Popen[bytes]) -> None:
-    """End a program and its child processes."""
-    try:
-        os.killpg(process.pid, signal.SIGKILL)
-    except (ProcessLookupError, PermissionError):
-        process.kill()
-    for pipe in _pipes(process):
-        with suppress(OSError):
-            pipe.close()
-    process.wait()
 
 
 def _actions(answer: Any, games: int) -> FloatArray | str:

@@ -100,10 +100,8 @@ def test_onnx__another_observation_is_refused(tmp_path: Path, car: Car) -> None:
 
 def test_onnx__is_data_and_torchscript_is_code(tmp_path: Path) -> None:
     onnx_file(tmp_path / "a.onnx")
-    (tmp_path / "a.onnx.data").write_bytes(b"weights")
     name = document(tmp_path, 'kind = "onnx"\nfile = "a.onnx"')
-    found = find(name, tmp_path, allow_code=False)
-    assert {Path(each).name for each in found.files} == {"a.onnx", "a.onnx.data"}
+    assert {Path(each).name for each in find(name, tmp_path, allow_code=False).files} == {"a.onnx"}
     name = document(tmp_path, 'kind = "torchscript"\nfile = "a.onnx"')
     with pytest.raises(UsageError, match=r"runs a TorchScript module, which is a program.*--allow-code"):
         find(name, tmp_path, allow_code=False)
