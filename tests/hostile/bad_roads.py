@@ -111,12 +111,26 @@ NETS = [
             ("a connection from nowhere", LINK, LINK.replace('from="approach"', 'from="aproach"'), ("connection from aproach to exit", "'approach_1'")),
             ("a connection from no lane", LINK, LINK.replace('fromLane="1"', 'fromLane="9"'), ("connection from approach to exit", "approach_9")),
             ("a connection over nowhere", LINK, LINK.replace(":taper_0_0", ":taper_9_9"), ("via", "':taper_0_0'")),
-            ("a connection of no direction", LINK, LINK.replace('dir="s" ', ""), ("'dir'",)),
+            ("a connection of no direction", LINK, LINK.replace('dir="s" ', ""), ("connection from approach to exit.dir", "missing")),
             ("a junction that goes round for ever", INNER, INNER.replace("dir=", 'via=":taper_0_0" dir='), ("lane :taper_0_0", "back to itself")),
             ("a junction nowhere", '<junction id="finish" type="dead_end" x="220.00"', '<junction id="finish" type="dead_end" x="nan"', ("junction finish",)),
             ("a junction of no kind", '<junction id="finish" type="dead_end"', '<junction id="finish" type="roundabout_of_doom"', ()),
             ("a junction of one coordinate", 'shape="220.00,-3.20 220.00,0.00"', 'shape="220.00 0.00"', ("junction finish.shape",)),
-            ("a junction of lanes that are not", 'incLanes="approach_0 approach_1"', 'incLanes="approach_7"', ()),
+            ("a junction with a misspelt lane", 'incLanes="approach_0 approach_1"', 'incLanes="approach_0 aproach_1"', ("junction taper.incLanes", "'approach_1'")),
+            ("a junction with a misspelt lane inside", 'intLanes=":taper_0_0"', 'intLanes=":tapper_0_0"', ("junction taper.intLanes", "':taper_0_0'")),
+            ("a junction without lanes inside", ' intLanes=":taper_0_0"', '', ("junction taper.intLanes", "missing")),
+            *(
+                (f"{what} of {value!r}", old, new.format(value), (f"{key}: '{value}' is not an integer",))
+                for value in ("-0.0", "nan", "1e400", "nope", " 1", "-1", "١")
+                for what, old, new, key in (
+                    ("a request", '<request index="0"', '<request index="{}"', "junction taper.request.index"),
+                    ("a lane's index", 'id="approach_1" index="1"', 'id="approach_1" index="{}"', "lane approach_1.index"),
+                    ("a connection from a lane", LINK, LINK.replace('fromLane="1"', 'fromLane="{}"'), "connection from approach to exit.fromLane"),
+                    ("a connection's light", LINK, LIT.replace('"2"', '"{}"'), "connection from approach to exit.linkIndex"),
+                )
+            ),
+            ("a priority", EDGE, EDGE.replace("-1", "-0.0"), ("edge exit.priority", "not an integer")),
+            ("a roundabout of misspelt edges", '<junction id="finish"', '<roundabout nodes="taper" edges="aproach"/><junction id="finish"', ("roundabout.edges", "'approach'")),
             ("foes that are too many", 'foes="0"', f'foes="{"0" * 500}"', ()),
             ("a boundary that is none", 'convBoundary="0.00,0.00,220.00,0.00"', 'convBoundary="a,b"', ("location.convBoundary",)),
             ("a country", LANE, LANE.replace("100.00,-1.60", "100.00,15000000.00"), ("too large",)),

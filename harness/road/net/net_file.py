@@ -5,7 +5,8 @@ SUMO does not validate the numbers of a net, and invalid ones may crash it (SIGS
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Collection, Iterator, Sequence
 from graphlib import CycleError, TopologicalSorter
 from itertools import chain, islice
 from pathlib import Path
@@ -26,6 +27,23 @@ _WIDEST_M = 100_000.0
 _MOST_CELLS, _CELL_M = 4e6, 20.0  # of the grid of rails
 _MOST_LANES = 63
 _MOST_LINKS = 10_000  # of a traffic light
+_REQUIRED = {
+    "location": ("netOffset", "convBoundary", "origBoundary", "projParameter"),
+    "edge": ("id",),
+    "junction": ("id", "type", "incLanes", "intLanes"),
+    "request": ("index", "response", "foes"),
+    "connection": ("from", "to", "fromLane", "toLane", "dir", "state"),
+    "roundabout": ("nodes", "edges"),
+    "tlLogic": ("id",),
+}
+_MAY_BE_EMPTY = ("incLanes", "intLanes")
+_INTEGERS = {
+    "edge": ("priority",),
+    "lane": ("index",),
+    "connection": ("fromLane", "toLane", "linkIndex", "linkIndex2"),
+    "request": ("index",),
+}
+_INDEX, _PRIORITY = re.compile(r"\d{1,6}", re.ASCII), re.compile(r"-?\d{1,6}", re.ASCII)
 _CHILDREN = {
     "net": "location type edge tlLogic junction connection prohibition roundabout taz",
     "type": "restriction meso laneType",
@@ -47,12 +65,34 @@ def check_net(path: Path) -> None:
         raise UsageError.of(path, str(root.tag), "is not a SUMO net: its root is not net", _REMEDY)
     if unknown := problems_in(path, root, _KINDS):
         raise UsageError(unknown)
-    faults = chain(_number_faults(root), _reference_faults(root), _signal_faults(root))
+    faults = chain(_attribute_faults(root), _number_faults(root), _reference_faults(root), _signal_faults(root))
     problems = [Problem(str(path), key, message, _REMEDY) for key, message in islice(faults, _MOST_PROBLEMS)]
     if problems:
         raise UsageError(problems)
     if too_large := _too_large(root):
         raise UsageError.of(path, "", too_large, "cut out the part that the scene needs")
+
+
+def _named(element: ElementTree.Element) -> str:
+    """An element as messages name it."""
+    if element.tag == "connection":
+        return f"connection from {element.get('from')} to {element.get('to')}"
+    return f"{element.tag} {element.get('id')}" if element.get("id") else str(element.tag)
+
+
+def _attribute_faults(root: ElementTree.Element) -> Iterator[tuple[str, str]]:
+    """Key and message of each attribute that is missing, and of each index or priority that is not an integer."""
+    for parent in root:
+        for element in (parent, *parent):
+            inside = element is not parent and not element.get("id")
+            where = f"{_named(parent)}.{element.tag}" if inside else _named(element)
+            for name in _REQUIRED.get(element.tag, ()):
+                if not element.get(name) and (element.get(name) is None or name not in _MAY_BE_EMPTY):
+                    yield f"{where}.{name}", "is missing or empty"
+            for name in _INTEGERS.get(element.tag, ()):
+                value = element.get(name)
+                if value and not (_PRIORITY if name == "priority" else _INDEX).fullmatch(value):
+                    yield f"{where}.{name}", f"{value[:60]!r} is not an integer that is possible here"
 
 
 def _number_faults(root: ElementTree.Element) -> Iterator[tuple[str, str]]:
@@ -100,29 +140,41 @@ def _reference_faults(root: ElementTree.Element) -> Iterator[tuple[str, str]]:
         if not edge.get("function") or edge.get("function") == "normal":
             for end in ("from", "to"):
                 if edge.get(end) not in junctions:
-                    remedy = nearest(edge.get(end, ""), junctions or ["(there is no junction)"])
-                    yield f"edge {name}.{end}", f"there is no junction {edge.get(end)!r}; {remedy}"
+                    yield f"edge {name}.{end}", _absent("junction", edge.get(end, ""), junctions)
     known = set(chain.from_iterable(lanes.values()))
-    for neighbour in root.iter("neigh"):
-        name = neighbour.get("lane", "")
-        if name not in known:
-            yield "neigh.lane", f"there is no lane {neighbour.get('lane')!r}; {nearest(name, known)}"
+    for element in root.iter():
+        for attribute, kind, names in (
+            ("incLanes", "lane", known),
+            ("intLanes", "lane", known),
+            ("lane", "lane", known),  # of a neigh
+            ("bidi", "edge", lanes),
+            ("crossingEdges", "edge", lanes),
+            ("nodes", "junction", junctions),  # of a roundabout, as its edges
+            ("edges", "edge", lanes),
+        ):
+            for name in element.get(attribute, "").split():
+                if name not in names:
+                    yield f"{_named(element)}.{attribute}", _absent(kind, name, names)
     following: dict[str, list[str]] = {}
     for link in root.findall("connection"):
-        key = f"connection from {link.get('from')} to {link.get('to')}"
+        key = _named(link)
         for end in ("from", "to"):
             lane = f"{link.get(end)}_{link.get(f'{end}Lane')}"
             if lane not in known:
-                yield f"{key}.{end}", f"there is no lane {lane!r}; {nearest(lane, known or ['(there is no lane)'])}"
+                yield f"{key}.{end}", _absent("lane", lane, known)
         via = link.get("via")
         if via and via not in known:
-            yield f"{key}.via", f"there is no lane {via!r}; {nearest(via, known or ['(there is no lane)'])}"
+            yield f"{key}.via", _absent("lane", via, known)
         if via and link.get("from", "").startswith(":"):
             following.setdefault(f"{link.get('from')}_{link.get('fromLane')}", []).append(via)
     try:
         TopologicalSorter(following).prepare()
     except CycleError as error:
         yield f"lane {error.args[1][0]}", "leads back to itself inside a junction"
+
+
+def _absent(kind: str, name: str, names: Collection[str]) -> str:
+    return f"there is no {kind} {name[:60]!r}" + (f"; {nearest(name, names)}" if names else "")
 
 
 def _signal_faults(root: ElementTree.Element) -> Iterator[tuple[str, str]]:
