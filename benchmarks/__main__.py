@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from subprocess import SubprocessError
 from typing import Annotated, Any
 
 import typer
@@ -162,12 +163,13 @@ def _measure_all(
             try:
                 on_progress = _bar_updater(bars, task, done_s, seconds)
                 values, details = measurement.measure(budget, on_progress)
-            except (SideFailed, OSError) as error:
+                results |= {key: values[key] for key in measurement.keys}
+            except (SideFailed, OSError, SubprocessError) as error:
                 failed.append(measurement.name)
                 message = f"{measurement.name} failed: {error}"
                 bars.console.print(message, style="red", highlight=False, markup=False)
-                values, details = {}, {"failed": str(error).strip().splitlines()[-1]}
-            results |= {key: values.get(key) for key in measurement.keys}
+                results |= dict.fromkeys(measurement.keys)
+                details = {"failed": str(error).strip().splitlines()[-1]}
             results["details"][measurement.name] = details
             write(out, results)
             done_s += seconds

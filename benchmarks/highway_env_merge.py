@@ -13,7 +13,7 @@ from benchmarks.arena import arena_side
 from benchmarks.budget import Budget
 from benchmarks.figures import Measured
 from benchmarks.games import GAMES
-from benchmarks.sides import LapTimer, OnProgress, Side, best_rate, raw_numbers, take_turns
+from benchmarks.sides import LapTimer, OnProgress, Side, SideFailed, best_rate, raw_numbers, take_turns
 
 _WARM_UP_STEPS = 50
 _ACTIONS_KEPT = 509
@@ -60,9 +60,9 @@ def highway_env_side(timer: LapTimer) -> None:
 
 
 def vs_highway_env(budget: Budget, on_progress: OnProgress) -> Measured:
-    """Game-steps per second of one process on the arena, in multiples of those on highway-env."""
+    """Game-steps per second of one process on the arena, in multiples of those on highway-env. Raises SideFailed without it."""
     if importlib.util.find_spec("highway_env") is None:
-        return {}, {"not_measured": "highway-env is not installed: pip install -e '.[bench]'"}
+        raise SideFailed("highway-env is not installed: pip install -e '.[bench]'")
     sides = {"arena": Side(run=arena_side, arguments=(GAMES,)), "highway_env": Side(run=highway_env_side)}
     laps = take_turns(sides, repeats=budget.repeats, lap_s=budget.lap_s, on_progress=on_progress)
     details = {

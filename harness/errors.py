@@ -10,6 +10,7 @@ HarnessError                 any error that the harness raises
 
 from __future__ import annotations
 
+import resource
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TypeVar
@@ -103,9 +104,22 @@ class DriverError(HarnessError):
 _OUT_OF_MEMORY = ("allocate memory", "failed to map segment", "can't start new thread", "bad_alloc")
 
 
-def is_of_memory(error: BaseException) -> bool:
-    """Whether an error means that memory ran out. Libraries report this by different errors."""
-    return isinstance(error, MemoryError) or any(words in str(error) for words in _OUT_OF_MEMORY)
+def short_of_memory(error: BaseException) -> str:
+    """One line for an error that means that memory ran out; empty for other errors. Libraries report this by different
+    errors."""
+    reason = str(error)
+    if not isinstance(error, MemoryError) and not any(words in reason for words in _OUT_OF_MEMORY):
+        return ""
+    remedy = limited_memory() or "end other programs, or run fewer stages at once with --jobs"
+    return f"the machine is short of memory: {reason or 'no more could be allocated'} ({remedy})"
+
+
+def limited_memory() -> str:
+    """The limit of this process's address space and how to raise it, in words; empty without a limit."""
+    limit_bytes = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit_bytes == resource.RLIM_INFINITY:
+        return ""
+    return f"each process may use {limit_bytes / 1e9:.1f} GB of address space: raise this limit, ulimit -v"
 
 
 def collect(problems: list[Problem], action: Callable[[], T]) -> T | None:

@@ -87,7 +87,10 @@ def check_file(path: Path, most_bytes: int) -> None:
 def content_of(path: Path, most_bytes: int) -> bytes:
     """The bytes of a plain file. Raises OSError, with the reason in its `strerror`, for any other or larger file."""
     with _plain_file(path, most_bytes) as file:
-        content = file.read(most_bytes + 1)
+        size_bytes = os.fstat(file.fileno()).st_size
+        content = file.read(min(size_bytes, most_bytes) + 1)  # which are allocated at once
+    if len(content) > size_bytes:
+        raise OSError(errno.EIO, "was changed while it was read", str(path))
     if len(content) > most_bytes:
         raise OSError(errno.EFBIG, _too_large(len(content), most_bytes), str(path))
     return content

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.files import digest_of_file, write_atomically
+from harness.files import content_of, digest_of_file, write_atomically
 
 
 def test_write_atomically__writes_and_replaces(tmp_path: Path) -> None:
@@ -51,3 +51,22 @@ def test_digest_of_file__reads_in_blocks(tmp_path: Path) -> None:
     finally:
         tracemalloc.stop()
     assert digest == hashlib.sha256(bytes(30_000_000)).hexdigest()
+
+
+def test_content_of__a_small_file_takes_little_memory_whatever_the_bound(tmp_path: Path) -> None:
+    file = tmp_path / "table.csv"
+    file.write_bytes(b"content")
+    tracemalloc.start()
+    try:
+        assert content_of(file, 10**9) == b"content"
+        assert tracemalloc.get_traced_memory()[1] < 10**6
+    finally:
+        tracemalloc.stop()
+
+
+def test_content_of__a_larger_file_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "table.csv"
+    file.write_bytes(b"content")
+    assert content_of(file, 7) == b"content"
+    with pytest.raises(OSError, match="is too large"):
+        content_of(file, 6)

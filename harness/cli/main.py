@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import resource
 import signal
 import sys
 from collections.abc import Callable, Iterator
@@ -30,7 +31,7 @@ from harness.cli.output import (
 from harness.cli.pinning import minimise, regression
 from harness.cli.runs import compare, export, replay, serve
 from harness.cli.scenes import scene_app
-from harness.errors import FAILED, NOT_ACCEPTED, USAGE_ERROR
+from harness.errors import FAILED, NOT_ACCEPTED, USAGE_ERROR, HarnessError, UsageError, short_of_memory
 from harness.shipped_documents import document_at
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
 
 MACHINE_ERRORS = (ENOSPC, EDQUOT, EACCES, EPERM, EROFS, EMFILE, ENOMEM, EFBIG, EIO)
 """Errors of the operating system that are no mistakes of the program: they are reported without a traceback."""
+_ADDRESS_SPACE_BYTES = 2.5e9  # libraries reserve 2.0 GB, and abort or hang where they get less
 INTERRUPTED = 130
 """The exit code after Ctrl-C: 128 plus the number of SIGINT."""
 
@@ -123,7 +125,8 @@ def campaign(
     Run the command again to continue an interrupted campaign; finished stages are skipped. The run folder contains CSV
     tables, report.html, trained policies, traces, replays for SUMO-GUI, and harness.log.
     """
-    with output(as_json, quiet, verbose) as console:
+    with output(as_json, quiet, verbose) as console, _interruptible(console):
+        _check_address_space()
         file = document_at(file, "campaigns")
         with console.status(messages.reading(file)):  # shown before what takes time to import
             from harness.campaign.execution.run_campaign import run_campaign
@@ -136,13 +139,8 @@ def campaign(
         folder = RunFolder(out or Path("reports") / opened.run_name)
         if quick and not opened.quick:
             console.print(messages.NOTHING_TO_SHORTEN)
-        _handle_termination_signals()
-        try:
-            with _started_on(ray, jobs, lambda line: print_plain([line], console)) as start_workers:
-                outcome = run_campaign(opened, folder, start_workers, console, keep_going=keep_going)
-        except KeyboardInterrupt as interrupt:
-            console.print(messages.INTERRUPTED)
-            raise typer.Exit(*(interrupt.args or [INTERRUPTED])) from None
+        with _started_on(ray, jobs, lambda line: print_plain([line], console)) as start_workers:
+            outcome = run_campaign(opened, folder, start_workers, console, keep_going=keep_going)
         _end_with(outcome, folder.path, console, as_json)
 
 
@@ -165,6 +163,7 @@ def demo(
 def report(run: RunPath, as_json: AsJson = False, quiet: Quiet = False, verbose: Verbose = False) -> None:
     """Write the tables, replays and report.html of a run again, from its folder alone."""
     with output(as_json, quiet, verbose) as console:
+        _check_address_space()
         from harness.campaign.results.results import write_results
         from harness.campaign.storage.run_folder import RunFolder
 
@@ -232,8 +231,9 @@ def _end_with(outcome: RunResult, run: Path, console: Console, as_json: bool = F
         raise typer.Exit(outcome.exit_code)
 
 
-def _handle_termination_signals() -> None:
-    """Let SIGTERM and SIGHUP end the command as Ctrl-C does, with an exit code of its own as the exception's value."""
+@contextmanager
+def _interruptible(console: Console) -> Iterator[None]:
+    """Let Ctrl-C, SIGTERM and SIGHUP end the command with one message, each with an exit code of its own."""
 
     def terminate(number: int, frame: object) -> NoReturn:
         raise KeyboardInterrupt(128 + number)
@@ -241,6 +241,19 @@ def _handle_termination_signals() -> None:
     for name in ("SIGTERM", "SIGHUP"):  # a signal that nohup ignores stays ignored
         if hasattr(signal, name) and signal.getsignal(getattr(signal, name)) is signal.SIG_DFL:
             signal.signal(getattr(signal, name), terminate)
+    try:
+        yield
+    except KeyboardInterrupt as interrupt:
+        console.print(messages.INTERRUPTED)
+        raise typer.Exit(*(interrupt.args or [INTERRUPTED])) from None
+
+
+def _check_address_space() -> None:
+    """Raise UsageError for a limit with which libraries abort this process when it writes the results."""
+    limit_bytes = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if resource.RLIM_INFINITY != limit_bytes < _ADDRESS_SPACE_BYTES:
+        message = "is too little address space: the command needs 2.5 GB, workers that train need 4 GB"
+        raise UsageError.of("ulimit -v", f"{limit_bytes // 1024} kB", message, "raise the limit: ulimit -v unlimited")
 
 
 def _fail(message: str, code: int) -> NoReturn:
@@ -250,8 +263,6 @@ def _fail(message: str, code: int) -> NoReturn:
 
 def main() -> None:
     """The `harness` command: usage errors are printed without a traceback."""
-    from harness.errors import HarnessError, UsageError, is_of_memory
-
     try:
         app()
     except UsageError as error:
@@ -259,8 +270,8 @@ def main() -> None:
     except HarnessError as error:
         _fail(f"{type(error).__name__}: {error}", FAILED)
     except Exception as error:
-        if is_of_memory(error):
-            _fail(f"the machine is short of memory: {error or 'none is left'}; finished work is kept", FAILED)
+        if message := short_of_memory(error):
+            _fail(f"{message}; finished work is kept", FAILED)
         if not isinstance(error, OSError) or error.errno not in MACHINE_ERRORS:
             raise
         _fail(f"{error.filename or 'the run folder'}: {error.strerror}; finished work is kept", FAILED)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import re
+import resource
 import shutil
+import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -184,6 +186,54 @@ def test_main__an_error_of_sumo_is_one_message(
     monkeypatch.setattr("harness.campaign.results.results.write_results", fail)
     result = run_command("report", learned_run())
     assert (result.code, result.err.strip()) == (FAILED, "SimulationError: SUMO died")
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGINT, 130)])
+def test_campaign__ended_while_it_is_read_says_that_it_continues(
+    number: signal.Signals, code: int, run_command: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = {each: signal.signal(each, signal.SIG_DFL) for each in (signal.SIGTERM, signal.SIGHUP)}
+    monkeypatch.setattr(cli, "document_at", lambda *_: signal.raise_signal(number))
+    try:
+        assert run_command("campaign", "merge") == (code, f"{messages.INTERRUPTED}\n", "")
+    finally:
+        for each, handler in before.items():
+            signal.signal(each, handler)
+
+
+@pytest.mark.parametrize("arguments", [("campaign", "merge"), ("report", "nowhere")])
+def test_command__with_too_little_address_space_is_refused(
+    arguments: tuple[str, ...], run_command: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("resource.getrlimit", lambda kind: (1_600_000 * 1024, resource.RLIM_INFINITY))
+    code, out, err = run_command(*arguments)
+    assert (code, out, len(err.splitlines())) == (USAGE_ERROR, "", 1)
+    assert err.startswith("ulimit -v: 1600000 kB: is too little address space")
+
+
+@pytest.mark.parametrize(
+    ("limit_bytes", "remedy"),
+    [
+        (
+            resource.RLIM_INFINITY,
+            "(end other programs, or run fewer stages at once with --jobs); finished work is kept",
+        ),
+        (
+            3 * 10**9,
+            "(each process may use 3.0 GB of address space: raise this limit, ulimit -v); finished work is kept",
+        ),
+    ],
+)
+def test_main__without_memory_the_message_is_a_whole_sentence(
+    limit_bytes: int, remedy: str, run_command: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr("harness.campaign.results.results.write_results", fail)
+    monkeypatch.setattr("resource.getrlimit", lambda kind: (limit_bytes, limit_bytes))
+    expected = f"the machine is short of memory: no more could be allocated {remedy}\n"
+    assert run_command("report", learned_run()) == (FAILED, "", expected)
 
 
 def test_main__a_bug_has_a_traceback(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,10 +7,15 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from subprocess import CalledProcessError
+from unittest.mock import Mock
 
 import pytest
+from typer.testing import CliRunner
 
-from benchmarks.figures import KEYS, MEASUREMENTS
+from benchmarks.__main__ import app
+from benchmarks.figures import KEYS, MEASUREMENTS, Measurement
+from benchmarks.sides import SideFailed
 from tests.support.repository import REPOSITORY
 
 NEEDS_EXTRA = {"vs_highway_env"}
@@ -29,6 +34,25 @@ def test_fast__measures_every_figure(measurement, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
     figures = json.loads(results.read_text(encoding="utf-8"))
     assert [key for key in measurement.keys if figures[key] is None] == []
+
+
+@pytest.mark.parametrize("error", [SideFailed("a side ended"), OSError("no room"), CalledProcessError(1, "harness")])
+def test_measure__a_figure_that_fails_is_null_and_the_exit_code_is_1(
+    error: Exception, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Measurement, "measure", Mock(side_effect=error))
+    ended = CliRunner().invoke(app, ["--fast", "--only", "help_seconds", "--out", str(tmp_path / "results.json")])
+    assert ended.exit_code == 1
+    assert f"commands failed: {error}" in ended.output
+    results = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
+    assert (results["help_seconds"], results["details"]["commands"]) == (None, {"failed": str(error)})
+
+
+def test_measure__without_highway_env_its_figure_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    ended = CliRunner().invoke(app, ["--fast", "--only", "vs_highway_env", "--out", str(tmp_path / "results.json")])
+    assert ended.exit_code == 1
+    assert "highway-env failed: highway-env is not installed" in ended.output
 
 
 def test_published__every_figure_is_measured() -> None:

@@ -26,7 +26,7 @@ from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign
 from harness.config.persona import Persona
 from harness.drivers.external import ExternalDriver
-from harness.errors import HarnessError, is_of_memory
+from harness.errors import HarnessError, short_of_memory
 from harness.files import make_folder
 
 OnProgress: TypeAlias = Callable[[int, int], None]
@@ -167,10 +167,7 @@ def carry_out_in_worker(stage: Stage, attempt: Attempt, *, context: RunContext, 
     except (HarnessError, OSError) as error:
         return Event(kind="failed", stage=stage.id, message=str(error))
     except Exception as error:
-        if is_of_memory(error):
-            message = f"the machine is short of memory: {error or 'none is left'}"
-        else:
-            message = traceback.format_exc()  # a bug: its traceback is the message
+        message = short_of_memory(error) or traceback.format_exc()  # a bug: its traceback is the message
         return Event(kind="failed", stage=stage.id, message=message)
 
 

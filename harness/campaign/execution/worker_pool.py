@@ -22,6 +22,7 @@ from multiprocessing.connection import Connection, wait
 from harness.campaign.execution.run_stage import carry_out
 from harness.campaign.execution.stage_run import Attempt, Event, RunContext, Work, carry_out_in_worker
 from harness.campaign.plan.stages import Stage
+from harness.errors import limited_memory
 
 _TERMINATING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 _PROGRAM = "import json, sys; sys.path[:] = json.loads(sys.argv[2]); from {0} import serve; serve(int(sys.argv[1]))"
@@ -159,7 +160,8 @@ class WorkerPool:
         except (EOFError, OSError):  # it closed the connection, so it is ending
             code = self._replace(worker)
             cause = signal.Signals(-code).name if code < 0 else f"exit code {code}"
-            event = Event(kind="crashed", stage=worker.stage.id, message=f"the worker died of {cause}")
+            limit = f" ({words})" if (words := limited_memory()) else ""  # libraries abort where memory runs out
+            event = Event(kind="crashed", stage=worker.stage.id, message=f"the worker died of {cause}{limit}")
         if event.kind in ("crashed", "done", "failed"):
             worker.stage = None
         return event

@@ -8,6 +8,8 @@ import time
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from harness.campaign.execution.run_stages import MOST_CRASHES, run_stages
 from harness.campaign.execution.stage_run import Event, StageRun
 from harness.campaign.execution.worker_pool import WorkerPool
@@ -123,6 +125,14 @@ def test_run_stages__a_stage_that_always_kills_its_worker_fails_by_name(tmp_path
 def test_run_stages__a_worker_that_dies_with_nothing_to_do_is_replaced(tmp_path: Path) -> None:
     events = run(tmp_path, [stage("a"), stage("b", "a"), stage("c", "a")], die_when_idle)
     assert sorted(told(events, "done")) == ["a", "b", "c"]
+
+
+def test_run_stages__a_worker_that_dies_under_a_limit_of_memory_names_the_limit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("resource.getrlimit", lambda kind: (3 * 10**9, 3 * 10**9))
+    (failed,) = (each for each in run(tmp_path, [stage("b")], die_in_b, jobs=1) if each.kind == "failed")
+    assert "SIGSEGV (each process may use 3.0 GB of address space: raise this limit, ulimit -v)" in failed.message
 
 
 def need_too_much(stage: Stage, run: StageRun) -> dict[str, Any]:
