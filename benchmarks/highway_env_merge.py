@@ -60,7 +60,10 @@ def highway_env_side(timer: LapTimer) -> None:
 
 
 def vs_highway_env(budget: Budget, on_progress: OnProgress) -> Measured:
-    """Game-steps per second of one process on the arena, in multiples of those on highway-env. Raises SideFailed without it."""
+    """Game-steps per second of one process on the arena, in multiples of those on highway-env.
+
+    Raises SideFailed without highway-env.
+    """
     if importlib.util.find_spec("highway_env") is None:
         raise SideFailed("highway-env is not installed: pip install -e '.[bench]'")
     sides = {"arena": Side(run=arena_side, arguments=(GAMES,)), "highway_env": Side(run=highway_env_side)}
