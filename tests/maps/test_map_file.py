@@ -55,6 +55,17 @@ def test_facts__are_those_of_the_file_when_it_is_compressed(tmp_path: Path) -> N
     assert facts_of(packed, MapKind.OSM) == facts_of(MAPS / "town.osm", MapKind.OSM)
 
 
+@pytest.mark.parametrize("encoding", ["foo", "utf-16", "idna", "zlib", "undefined", "", "x" * 3000])
+@pytest.mark.parametrize(("name", "kind"), [("town.osm", MapKind.OSM), ("t_junction.xodr", MapKind.OPENDRIVE)])
+def test_facts__of_a_file_in_another_encoding_are_refused(
+    name: str, kind: MapKind, encoding: str, tmp_path: Path
+) -> None:
+    body = (MAPS / name).read_text(encoding="utf-8").partition("?>")[2]
+    (tmp_path / name).write_text(f'<?xml version="1.0" encoding="{encoding}"?>{body}', encoding="utf-8")
+    with pytest.raises(UsageError, match="is not readable XML"):
+        facts_of(tmp_path / name, kind)
+
+
 def test_facts__of_opendrive_name_the_side_of_the_road(tmp_path: Path) -> None:
     text = (MAPS / "t_junction.xodr").read_text()
     assert facts_of(MAPS / "t_junction.xodr", MapKind.OPENDRIVE).rules == {"RHT"}

@@ -81,6 +81,14 @@ def test_scene__all_problems_are_named_at_once(folder: Path) -> None:
     assert keys == ["vehicle third", "ego.vehicle", "goal.edge", "non_ego.lane"]
 
 
+def test_scene__a_problem_of_the_route_file_hides_no_misspelt_lane(folder: Path) -> None:
+    change(folder, "scene.toml", 'lane = "approach_0"', 'lane = "aproach_0"')
+    change(folder, "merge.rou.xml", "</routes>", '<vehicle id="third" depart="soon"/></routes>')
+    found = {(Path(each.file).name, each.key, each.remedy) for each in problems(folder)}
+    assert ("scene.toml", "non_ego.lane", "did you mean 'approach_0'?") in found
+    assert any(name == "merge.rou.xml" for name, *_ in found)
+
+
 def test_scene__a_problem_of_the_document_hides_none_of_the_files(folder: Path) -> None:
     change(folder, "scene.toml", "friction =", "fricton =")
     change(folder, "merge.rou.xml", 'route="through" depart="0" departLane="0"', 'route="trough" depart="soon"')

@@ -61,6 +61,12 @@ def read_scene(folder: Path, ego_type: str | None) -> SceneFiles:
     net_file, route_files = folder / named.net, [folder / each for each in (named.routes, *named.additional)]
     net = collect(problems, lambda: _net(net_file, folder))
     routes = collect(problems, lambda: _routes(route_files, folder, document, ego_type))
+    if (
+        document is not None and net is not None and routes is None
+    ):  # players are not opened: their lanes are checked here
+        for role, player in zip(document.roles, document.players, strict=True):
+            if player.lane:
+                collect(problems, partial(network.find_lane, net, file, f"{role}.lane", player.lane))
     if document is None or net is None or routes is None:
         raise UsageError(problems)
     routes = with_walkers(routes, document, net)
