@@ -104,14 +104,15 @@ class DriverError(HarnessError):
 _OUT_OF_MEMORY = ("allocate memory", "failed to map segment", "can't start new thread", "bad_alloc")
 
 
+def is_of_memory(error: BaseException) -> bool:
+    """Whether an error means that memory ran out. Libraries report this by different errors."""
+    return isinstance(error, MemoryError) or any(words in str(error) for words in _OUT_OF_MEMORY)
+
+
 def short_of_memory(error: BaseException) -> str:
-    """One line for an error that means that memory ran out; empty for other errors. Libraries report this by different
-    errors."""
-    reason = str(error)
-    if not isinstance(error, MemoryError) and not any(words in reason for words in _OUT_OF_MEMORY):
-        return ""
+    """One line for an error that means that memory ran out."""
     remedy = limited_memory() or "end other programs, or run fewer stages at once with --jobs"
-    return f"the machine is short of memory: {reason or 'no more could be allocated'} ({remedy})"
+    return f"the machine is short of memory: {str(error) or 'no more could be allocated'} ({remedy})"
 
 
 def limited_memory() -> str:

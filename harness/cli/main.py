@@ -31,7 +31,7 @@ from harness.cli.output import (
 from harness.cli.pinning import minimise, regression
 from harness.cli.runs import compare, export, replay, serve
 from harness.cli.scenes import scene_app
-from harness.errors import FAILED, NOT_ACCEPTED, USAGE_ERROR, HarnessError, UsageError, short_of_memory
+from harness.errors import FAILED, NOT_ACCEPTED, USAGE_ERROR, HarnessError, UsageError, is_of_memory, short_of_memory
 from harness.shipped_documents import document_at
 
 if TYPE_CHECKING:
@@ -270,8 +270,8 @@ def main() -> None:
     except HarnessError as error:
         _fail(f"{type(error).__name__}: {error}", FAILED)
     except Exception as error:
-        if message := short_of_memory(error):
-            _fail(f"{message}; finished work is kept", FAILED)
+        if is_of_memory(error):
+            _fail(f"{short_of_memory(error)}; finished work is kept", FAILED)
         if not isinstance(error, OSError) or error.errno not in MACHINE_ERRORS:
             raise
         _fail(f"{error.filename or 'the run folder'}: {error.strerror}; finished work is kept", FAILED)

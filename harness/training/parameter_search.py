@@ -26,7 +26,7 @@ from harness.drivers.car import car_of
 from harness.drivers.external import ExternalDriver
 from harness.drivers.mixture import Mixture
 from harness.drivers.protocol import Driver
-from harness.errors import SimulationError, StageFailed, short_of_memory
+from harness.errors import SimulationError, StageFailed, is_of_memory
 from harness.files import write_atomically
 from harness.game.roles import EGO
 from harness.game.seeding import seed_of
@@ -126,7 +126,7 @@ def _run_trial(search: SearchSpec, games: PairedRollouts, values: Mapping[str, f
     except (SimulationError, OSError):
         raise
     except Exception as error:  # a driver may raise any exception: the search continues
-        if short_of_memory(error):
+        if is_of_memory(error):
             raise
         return Trial(values=values, mean_payoff=None, failure_rate=None, error=f"{type(error).__name__}: {error}")
     finally:

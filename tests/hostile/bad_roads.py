@@ -129,6 +129,7 @@ NETS = [
                     ("a connection's light", LINK, LIT.replace('"2"', '"{}"'), "connection from approach to exit.linkIndex"),
                 )
             ),
+            ("an edge of no function", '<edge id=":taper_0" function="internal"', '<edge id=":taper_0" function="internl"', ("edge :taper_0.function", "'internal'")),
             ("a priority", EDGE, EDGE.replace("-1", "-0.0"), ("edge exit.priority", "not an integer")),
             ("a roundabout of misspelt edges", '<junction id="finish"', '<roundabout nodes="taper" edges="aproach"/><junction id="finish"', ("roundabout.edges", "'approach'")),
             ("foes that are too many", 'foes="0"', f'foes="{"0" * 500}"', ()),

@@ -26,7 +26,7 @@ from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign
 from harness.config.persona import Persona
 from harness.drivers.external import ExternalDriver
-from harness.errors import HarnessError, short_of_memory
+from harness.errors import HarnessError, is_of_memory, short_of_memory
 from harness.files import make_folder
 
 OnProgress: TypeAlias = Callable[[int, int], None]
@@ -167,7 +167,8 @@ def carry_out_in_worker(stage: Stage, attempt: Attempt, *, context: RunContext, 
     except (HarnessError, OSError) as error:
         return Event(kind="failed", stage=stage.id, message=str(error))
     except Exception as error:
-        message = short_of_memory(error) or traceback.format_exc()  # a bug: its traceback is the message
+        # the message of a bug is its traceback
+        message = short_of_memory(error) if is_of_memory(error) else traceback.format_exc()
         return Event(kind="failed", stage=stage.id, message=message)
 
 

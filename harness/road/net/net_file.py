@@ -36,6 +36,7 @@ _REQUIRED = {
     "roundabout": ("nodes", "edges"),
     "tlLogic": ("id",),
 }
+_FUNCTIONS = ("normal", "internal", "connector", "crossing", "walkingarea")
 _MAY_BE_EMPTY = ("incLanes", "intLanes")
 _INTEGERS = {
     "edge": ("priority",),
@@ -137,7 +138,10 @@ def _reference_faults(root: ElementTree.Element) -> Iterator[tuple[str, str]]:
         lanes[name] = [lane.get("id", "") for lane in edge.findall("lane")]
         if lanes[name] != [f"{name}_{k}" for k in range(len(lanes[name]))] or not 0 < len(lanes[name]) <= _MOST_LANES:
             yield f"edge {name}", f"its lanes are not called {name}_0, {name}_1 and so on"
-        if not edge.get("function") or edge.get("function") == "normal":
+        function = edge.get("function", "normal")
+        if function not in _FUNCTIONS:
+            yield f"edge {name}.function", f"SUMO has no function {function[:60]!r}; {nearest(function, _FUNCTIONS)}"
+        if function == "normal":
             for end in ("from", "to"):
                 if edge.get(end) not in junctions:
                     yield f"edge {name}.{end}", _absent("junction", edge.get(end, ""), junctions)
