@@ -148,6 +148,18 @@ def reads(
     print(reads_table(laps))
 
 
+@app.command()
+def maps(
+    folders: Annotated[list[Path], typer.Argument(metavar="FOLDER...", exists=True, file_okay=False)],
+) -> None:
+    """Print what `harness scene new` makes of the maps below folders, in Markdown: a scene that a rule-based driver can
+    drive, or the reason for which it refuses the map."""
+    from benchmarks.maps import maps_table
+
+    for line in maps_table(folders):
+        print(line, flush=True)
+
+
 def _measure_all(
     measurements: Sequence[Measurement], budget: Budget, results: dict[str, Any], out: Path, console: Console
 ) -> list[str]:
