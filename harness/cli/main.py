@@ -210,6 +210,8 @@ def _end_with(outcome: RunResult, run: Path, console: Console, as_json: bool = F
         console.print(label, style=_STYLES[verdict.tone], highlight=False, markup=False)
         for sentence in filter(None, (verdict.sentence, *verdict.causes, verdict.speed)):
             console.print(f"  {sentence}", highlight=False, markup=False)
+    for step in outcome.to_learn:
+        print_plain([f"To try: {step.sentence}", *(f"  {line}" for line in step.lines)], console)
     for bound in outcome.acceptance:
         print_plain([bound.text], console, "green" if bound.passed else "bold red")
     print_plain([f"Report: {run / 'report.html'}"], console)

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from harness.config.training import Training
 from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.worst_first import worst_first
 from harness.reports.embedding import key
@@ -30,7 +31,7 @@ class NextStep:
 
 def next_steps(tables: RunTables) -> list[NextStep]:
     """The first few steps that this run suggests, the most urgent first."""
-    steps = [*_finish(tables), *_learn(tables), *_watch(tables), *_widen(tables)]
+    steps = [*_finish(tables), *to_learn(tables), *_watch(tables), *_widen(tables)]
     return steps[:MOST_STEPS]
 
 
@@ -40,22 +41,31 @@ def _finish(tables: RunTables) -> Iterator[NextStep]:
         yield NextStep(sentence=sentence, command=command_of(tables.manifest))
 
 
-def _learn(tables: RunTables) -> Iterator[NextStep]:
-    """What helps people who did not learn to reach their goal. People on foot have no rule-based driver to imitate."""
-    unable = [
-        persona
-        for persona in tables.personas
-        if any(
-            name.startswith(f"{persona}-seed") and each.get("stopped") == DID_NOT_LEARN
-            for name, each in tables.stages.items()
-        )
-    ]
-    if unable and tables.non_ego_drives and not tables.campaign.get("non_ego_training", {}).get("imitation"):
+def to_learn(tables: RunTables) -> Iterator[NextStep]:
+    """What helps players that did not learn to drive the scene, so that the questions are answered. People on foot have
+    no rule-based driver to imitate."""
+    unable = [name for name, each in tables.stages.items() if each.get("stopped") == DID_NOT_LEARN]
+    if not unable:
+        return
+    campaign = tables.campaign
+    people = [each for each in tables.personas if any(name.startswith(f"{each}-seed") for name in unable)]
+    if people and tables.non_ego_drives and not campaign.get("non_ego_training", {}).get("imitation"):
         yield NextStep(
-            sentence=f"{' and '.join(unable)} did not learn to drive here. Let people imitate a rule-based driver "
+            sentence=f"{' and '.join(people)} did not learn to drive here. Let people imitate a rule-based driver "
             "before their training: add this to the campaign, and run it again.",
             command="[non_ego_training]\nimitation = true",
         )
+    if tables.manifest.get("quick"):
+        sentence = "With --quick, players train for a small part of the budget. Train them for all of it."
+        yield NextStep(sentence=sentence, command=command_of({**tables.manifest, "quick": False}))
+    else:
+        steps = 2 * int(campaign.get("training", {}).get("steps", Training().steps))
+        sentence = "Double the budget of the trainings: change this in the campaign, and run it again."
+        yield NextStep(sentence=sentence, command=f"[training]\nsteps = {steps}")
+    yield NextStep(
+        sentence="Try another conflict of the map: list those that there are.",
+        command="harness scene new NAME --from MAP --list",
+    )
 
 
 def _watch(tables: RunTables) -> Iterator[NextStep]:

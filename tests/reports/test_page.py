@@ -272,9 +272,22 @@ def test_next_steps__a_person_that_did_not_learn_may_imitate_a_driver(page):
     imitating = cannot_drive(campaign(personas=["speedy"]))
     imitating["manifest"]["campaign"]["non_ego_training"] = {"imitation": True}
     assert sentence not in text_of(imitating), "it has been tried"
+    assert "harness scene new NAME --from MAP --list" in told
     on_foot = text_of({**cannot_drive(campaign(personas=["speedy"])), "non_ego_drives": False})
     assert sentence not in on_foot, "there is no demonstrator on foot"
     assert "Does this person cause failures?" in on_foot
+
+
+@pytest.mark.parametrize(
+    ("quick", "command"), [(True, "harness campaign campaigns/merge.toml"), (False, "steps = 6000000")]
+)
+def test_next_steps__players_that_did_not_learn_may_train_longer(quick, command):
+    arguments = cannot_drive(campaign(personas=["speedy"]))
+    arguments["manifest"] |= {"quick": quick, "file": "campaigns/merge.toml"}
+    arguments["manifest"]["campaign"]["training"]["steps"] = 3_000_000
+    told = text_of(arguments).split("What to do next")[1]
+    assert command in told
+    assert f"{command} --quick" not in told
 
 
 # --- replays ---

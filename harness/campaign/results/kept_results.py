@@ -50,6 +50,13 @@ class ShownCheck(Document):
     text: Line
 
 
+class ShownStep(Document):
+    """A thing to try as the terminal shows it: a sentence, and the lines of a command or of a campaign's file."""
+
+    sentence: Line
+    lines: tuple[Line, ...]
+
+
 class RunResult(Document):
     """The result of a run, for the terminal and the exit code."""
 
@@ -61,6 +68,8 @@ class RunResult(Document):
     """Why games could not be played, the most frequent reason first."""
     did_not_learn: tuple[Line, ...] = ()
     """The trainings that made no player that can drive the scene, each with its share of goals and the bound."""
+    to_learn: tuple[ShownStep, ...] = ()
+    """What to try so that they learn, the first first."""
     acceptance: tuple[ShownCheck, ...] = ()
     """For each bound and persona the worst check; empty if the campaign has no bounds."""
 

@@ -8,7 +8,7 @@ from rich.console import Console
 
 from harness.campaign.results.ci_files import write_ci_files
 from harness.campaign.results.evaluate_run import csv_tables, evaluated
-from harness.campaign.results.kept_results import RunResult, ShownCheck, ShownVerdict, keep_result
+from harness.campaign.results.kept_results import RunResult, ShownCheck, ShownStep, ShownVerdict, keep_result
 from harness.campaign.results.model_cards import write_model_cards
 from harness.campaign.results.read_run import read_run
 from harness.campaign.results.recorded_games import recorded_games, scene_drawing
@@ -25,6 +25,7 @@ from harness.evaluation.unplayed_games import reasons_of
 from harness.files import write_atomically
 from harness.reports.acceptance_wording import acceptance_lines
 from harness.reports.game_wording import gap_verdicts
+from harness.reports.next_steps import to_learn
 from harness.reports.page import render_page
 from harness.reports.provenance import mixed_versions, warn
 from harness.reports.run_tables import QUESTIONS, RunTables
@@ -66,6 +67,10 @@ def _shown_result(campaign: Campaign, tables: RunTables) -> RunResult:
         error_games=int((tables.episodes["error"] != "").sum()),
         error_reasons=tuple(map(plain, reasons_of(tables.episodes["error"]))),
         did_not_learn=tuple(f"{name}: {shortfall}" for name, shortfall in did_not_learn(tables.stages).items()),
+        to_learn=tuple(
+            ShownStep(sentence=plain(each.sentence), lines=tuple(map(plain, each.command.splitlines())))
+            for each in to_learn(tables)
+        ),
         acceptance=tuple(
             ShownCheck(passed=each.passed, text=each.text)
             for each in acceptance_lines(tables.acceptance or (), len(campaign.seeds))
