@@ -165,8 +165,8 @@ def new_scene(
         check_new(name, [] if every else [name], out)
     console = console_of_any_encoding()
     with tempfile.TemporaryDirectory(prefix="harness-map-") as folder:
-        with console.status(messages.reading(source)):
-            opened = open_map(source, Path(folder), left_hand=left_hand)
+        with console.status(messages.reading(source)) as status:
+            opened = open_map(source, Path(folder), left_hand=left_hand, show=status.update)
         plans = _wanted(opened, kind, near, within)
         chosen = {name: plans[:_MOST_TRIED] if conflict is None else [_numbered(opened, conflict)]}
         if every:

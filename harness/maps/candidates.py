@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum, auto
+from functools import lru_cache
 from itertools import chain, combinations
 
 import numpy as np
@@ -52,7 +53,7 @@ class CandidateKind(Enum):
     FOLLOWING = "following"
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, slots=True)
 class LaneWay:
     """A way of cars over a junction, between two lanes."""
 
@@ -70,7 +71,7 @@ class LaneWay:
         return self.start.getEdge().getID(), self.end.getEdge().getID()
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, slots=True)
 class Candidate:
     """A place where two ways meet. The first is the ego's: the one with priority, if a vehicle has it."""
 
@@ -257,11 +258,13 @@ def following(net: Net) -> Iterator[Candidate]:
         )
 
 
+@lru_cache(maxsize=64)
 def _into(link: Connection) -> FloatArray:
     """[2] the unit direction in which a connection enters its junction."""
     return _direction(lane_line(link.getFromLane())[-2:])
 
 
+@lru_cache(maxsize=64)
 def _out(link: Connection) -> FloatArray:
     """[2] the unit direction in which it leaves the junction."""
     return _direction(lane_line(link.getToLane())[:2])

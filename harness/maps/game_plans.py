@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -41,9 +41,10 @@ _ALL_TURNS_DEG = 360.0  # of both routes, beside which the score is halved
 _BRAKING_MPS2, _REACTION_S = 3.0, 1.0  # of a driver who sees a stop line at the start
 _SPARE_S = 8.0
 _TIME_LIMITS_S = (30.0, 300.0)
+_SHOWN = 100  # conflicts from one line of progress to the next
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, slots=True)
 class Start:
     """A player's start: one of the three keys of a scene."""
 
@@ -54,7 +55,7 @@ class Start:
     lane: str = ""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, slots=True)
 class GamePlan:
     """Routes and starts of both players of a game at a candidate."""
 
@@ -103,15 +104,16 @@ class GamePlan:
 
 def _seconds(route: PlannedRoute, from_m: float, reds_s: Mapping[str, float]) -> float:
     """Time from a station to the goal, at the lowest share of the speed limit and through red lights."""
-    way_m = len(route.line) * SPACING_M - from_m
+    way_m = route.goal_m - from_m
     return way_m / (_SHARES[0] * route.limit_mps) + sum(reds_s[name] for at_m, name in route.lights if at_m > from_m)
 
 
 class Plans:
     """The candidates of a net of which a scene can be made, numbered from 1, and why the others are left out."""
 
-    def __init__(self, net: Net) -> None:
-        self.net = net
+    def __init__(self, net: Net, show: Callable[[str], object] = str) -> None:
+        """`show` gets a line on how far the search is."""
+        self.net, self._show = net, show
         self.left_out: dict[str, int] = {}
         self._routes: dict[tuple[LaneWay, float], PlannedRoute | None] = {}
         self._rings = {name for each in net.getRoundabouts() for name in each.getEdges()}
@@ -122,8 +124,12 @@ class Plans:
         instead."""
         found: list[GamePlan] = []
         reasons: dict[str, str] = {}  # the first of each with its example
+        self._show("finding conflicts")
         for group in (candidates, following):
-            for candidate in group(self.net) if not found else ():
+            listed = list(group(self.net)) if not found else []
+            for k, candidate in enumerate(listed):
+                if k % _SHOWN == 0:
+                    self._show(f"planning games: {k:,} of {len(listed):,} conflicts")
                 plan = self._plan(candidate)
                 if isinstance(plan, GamePlan):
                     found.append(plan)
@@ -213,8 +219,7 @@ class Plans:
             way = way_over(candidate, _WALK_MPS[1] * most_s + 2.0)
             if way is None:
                 return "no pavement on a side of it"
-            walked = shapely.LineString(way)
-            found = meeting_of_lines(ego_route.line, sampled_to(walked, walked.length))
+            found = meeting_of_lines(ego_route.line, sampled_to(way, shapely.LineString(way).length))
             if found is None:
                 continue
             start = _ego_start(found.ego_m, speed, seconds)
@@ -229,10 +234,11 @@ class Plans:
 
 def _timed(candidate: Candidate, *, ego_route: PlannedRoute, route: PlannedRoute, within_m: float) -> GamePlan | None:
     """The plan in which both arrive within `_APART_S` of each other; None if the routes leave no room for it."""
-    found = meeting_of_lines(ego_route.line, route.line)
+    line = ego_route.line
+    found = meeting_of_lines(line, route.line)
     if found is None:
         return None
-    point = ego_route.line[min(round(found.ego_m / SPACING_M), len(ego_route.line) - 1)]
+    point = line[min(round(found.ego_m / SPACING_M), len(line) - 1)]
     if float(np.hypot(*(point - candidate.place))) > within_m:
         return None
     tries = (_BEFORE_LIGHTS, *_TRIES) if ego_route.lights or route.lights else _TRIES
@@ -259,7 +265,7 @@ def _timed(candidate: Candidate, *, ego_route: PlannedRoute, route: PlannedRoute
 
 def _one_behind_the_other(candidate: Candidate, route: PlannedRoute) -> GamePlan | str:
     speed = _speeds(route.limit_mps, 1.0)
-    length_m, needed_m = len(route.line) * SPACING_M, _LEAST_FOLLOWING * following_m(route.limit_mps)
+    length_m, needed_m = route.goal_m, _LEAST_FOLLOWING * following_m(route.limit_mps)
     if length_m < needed_m:
         return f"too short a road: {length_m:.0f} m of {needed_m:.0f} m"
     return GamePlan(

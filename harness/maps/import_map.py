@@ -18,7 +18,7 @@ from harness.maps.map_file import MOST_BYTES, MapFacts, MapKind, facts_of, kind_
 from harness.road.net.net_file import check_net
 from harness.road.net.network import lane_line, read_net
 from harness.road.xml.sumo_program import run_program
-from harness.road.xml.xml_file import parse_xml, xml_bytes
+from harness.road.xml.xml_file import xml_bytes
 
 _PATIENCE_S = 900.0
 _LAYER_M = 6.0  # of height between a road and the one that it passes over
@@ -67,8 +67,15 @@ def _copied(path: Path, folder: Path, left_hand: bool) -> tuple[Path, Net]:
     except OSError as error:
         if error.errno == errno.EFBIG:
             raise UsageError.of(path, "", str(error.strerror), _CUT) from None
-    check_net(path)
-    root = parse_xml(path)
+    _check_own_net(path, left_hand)
+    file = folder / "converted.net.xml"
+    file.write_bytes(xml_bytes(path))
+    return file, read_net(path)
+
+
+def _check_own_net(path: Path, left_hand: bool) -> None:
+    """Raise UsageError for a net that is invalid, without right of way, or with traffic on the other side."""
+    root = check_net(path)
     says_left = root.get("lefthand") in ("true", "1")
     if left_hand and not says_left:
         message = "is a net with right-hand traffic"
@@ -76,9 +83,6 @@ def _copied(path: Path, folder: Path, left_hand: bool) -> tuple[Path, Net]:
     if not root.findall("junction/request") and len(root.findall("connection")) > 1:
         message = "has no right of way: its junctions have no element request"
         raise UsageError.of(path, "junction", message, "build it again with netconvert or netedit")
-    file = folder / "converted.net.xml"
-    file.write_bytes(xml_bytes(path))
-    return file, read_net(path)
 
 
 def _convert(path: Path, kind: MapKind, *, facts: MapFacts, net_file: Path, left_hand: bool) -> None:

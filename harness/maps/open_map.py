@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from html import unescape
 from pathlib import Path
 from xml.etree import ElementTree
@@ -33,8 +34,12 @@ class OpenMap:
     net_file: Path
     plans: Sequence[GamePlan]
     left_out: dict[str, int]  # reason and number of conflicts of which no scene can be made
-    reds_s: dict[str, float]  # the longest red of each traffic light
     net: Net = field(repr=False)
+
+    @cached_property
+    def reds_s(self) -> dict[str, float]:
+        """The longest red of each traffic light, by its id."""
+        return longest_reds_s(self.net_file)
 
     def near(self, edge: str | None, within_m: float) -> list[GamePlan]:
         """The plans at junctions near an edge, or all. Raises UsageError if there is no such edge."""
@@ -63,10 +68,13 @@ class OpenMap:
         return [listed_lane(lane) for edge in edges for lane in edge.getLanes()], listed_junctions(edges)
 
 
-def open_map(source: Path, folder: Path, *, left_hand: bool) -> OpenMap:
-    """Read a map, converted into `folder`. Raises UsageError for one on which no game can be made."""
+def open_map(source: Path, folder: Path, *, left_hand: bool, show: Callable[[str], object] = str) -> OpenMap:
+    """Read a map, converted into `folder`; `show` gets a line on how far this is.
+
+    Raises UsageError for a map on which no game can be made.
+    """
     net_file, net = import_map(source, folder, left_hand=left_hand)
-    plans = Plans(net)
+    plans = Plans(net, show)
     if not plans.all:
         reasons = "; ".join(f"{reason}: {count}" for reason, count in sorted(plans.left_out.items()))
         message = "has no conflict of which a scene can be made" + (f" ({reasons})" if reasons else "")
@@ -77,14 +85,13 @@ def open_map(source: Path, folder: Path, *, left_hand: bool) -> OpenMap:
         net=net,
         plans=plans.all,
         left_out=plans.left_out,
-        reds_s=longest_reds_s(net_file),
     )
 
 
 def longest_reds_s(net_file: Path) -> dict[str, float]:
     """The longest time for which a link of each traffic light of a checked net is yellow or red, by the light's id."""
     reds: dict[str, float] = {}
-    for logic in parse_xml(net_file).findall("tlLogic"):
+    for logic in parse_xml(net_file, lambda element: element.tag == "tlLogic"):
         name = logic.get("id", "")
         reds[name] = max(reds.get(name, 0.0), _longest_s(logic))
     return reds

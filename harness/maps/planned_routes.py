@@ -33,12 +33,13 @@ _ONTO_M = 1.5  # of the pavement at the end of a way
 _SHARPEST_DEG = 105.0
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, slots=True)
 class PlannedRoute:
     """A player's route, the place of its junction, and its goal."""
 
     edges: tuple[str, ...]
-    line: FloatArray  # [n, 2] points every `SPACING_M` up to the goal
+    points: FloatArray  # [n, 2] of its line, which goes on behind the goal
+    goal_m: float  # station
     junction_m: float  # station of the end of the edge before the junction
     goal_edge: str
     goal_position_m: float
@@ -52,6 +53,11 @@ class PlannedRoute:
         if max(self.turns_deg, default=0.0) > _SHARPEST_DEG:
             return f"turns above {_SHARPEST_DEG:.0f} degrees"
         return "" if shapely.LineString(self.line).is_simple else "loops"
+
+    @property
+    def line(self) -> FloatArray:
+        """[n, 2] points every `SPACING_M` up to the goal."""
+        return sampled_to(self.points, self.goal_m)
 
 
 def planned_route(net: Net, way: LaneWay, before_m: float, rings: Collection[str]) -> PlannedRoute | None:
@@ -87,13 +93,13 @@ def _with_goal(net: Net, edges: Sequence[Edge], place: int) -> PlannedRoute | No
         points, starts = route_line(net, edges)
     except ValueError:
         return None
-    line = shapely.LineString(points)
-    ends = [*starts[1::2], line.length]  # of the edges
+    length_m = float(_stations(points)[-1])
+    ends = [*starts[1::2], length_m]  # of the edges
     has_junction = place + 1 < len(edges)
     begin_m = starts[2 * place + 2] if has_junction else 0.0
     before = edges[: place + 1]
     limit_mps = min(edge.getSpeed() for edge in before)
-    goal_m = min(begin_m + BEYOND_M if has_junction else following_m(limit_mps), line.length - _ROOM_M)
+    goal_m = min(begin_m + BEYOND_M if has_junction else following_m(limit_mps), length_m - _ROOM_M)
     if goal_m < begin_m + _NEAREST_GOAL_M:
         return None
     k = next(index for index, end_m in enumerate(ends) if goal_m <= end_m)
@@ -101,7 +107,8 @@ def _with_goal(net: Net, edges: Sequence[Edge], place: int) -> PlannedRoute | No
     share = (goal_m - starts[2 * k]) / max(ends[k] - starts[2 * k], 1e-9)
     return PlannedRoute(
         edges=tuple(edge.getID() for edge in edges),
-        line=sampled_to(line, goal_m),
+        points=points,
+        goal_m=goal_m,
         junction_m=ends[place],
         goal_edge=edges[k].getID(),
         goal_position_m=float(np.floor(10.0 * share * edges[k].getLength()) / 10.0),
@@ -122,10 +129,14 @@ def _turn_deg(before: Edge, behind: Edge) -> float:
     return abs(float(np.degrees(np.arctan2(x * next_y - y * next_x, x * next_x + y * next_y))))
 
 
-def sampled_to(line: shapely.LineString, until_m: float) -> FloatArray:
-    """[n, 2] points of a line every `SPACING_M` up to a station."""
-    stations = np.arange(0.0, until_m + 1e-6, SPACING_M)
-    return np.asarray(shapely.get_coordinates(shapely.line_interpolate_point(line, stations)))
+def _stations(points: FloatArray) -> FloatArray:
+    return np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
+
+
+def sampled_to(points: FloatArray, until_m: float) -> FloatArray:
+    """[n, 2] points every `SPACING_M` up to a station of the line through `points` [m, 2]."""
+    wanted, stations = np.arange(0.0, until_m + 1e-6, SPACING_M), _stations(points)
+    return np.stack([np.interp(wanted, stations, each) for each in points.T], axis=1)
 
 
 def _previous(way: LaneWay | None, edges: Sequence[Edge], rings: Collection[str]) -> Connection | None:

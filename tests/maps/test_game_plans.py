@@ -106,6 +106,13 @@ def test_plans__a_start_is_clear_of_stop_lines(town: Plans) -> None:
             )
 
 
+def test_plans__say_how_far_their_search_is(build_net: Callable[..., Path]) -> None:
+    said: list[str] = []
+    plans = Plans(read_net(build_net(CROSSING_NODES, CROSSING_EDGES, "", "--no-turnarounds")), said.append)
+    assert len(plans.all) == 3
+    assert said == ["finding conflicts", "planning games: 0 of 3 conflicts"]
+
+
 # a start at 9.0 to 13.2 m/s under a limit of 13.89 m/s: 65 to 95 %
 def test_plans__start_the_ego_seconds_before_the_place_below_its_limit(town: Plans) -> None:
     plan = next(plan for plan in of_kind(town, CandidateKind.TURN_ACROSS) if plan.candidate.with_signals)

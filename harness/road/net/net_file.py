@@ -59,8 +59,9 @@ _KINDS = {tag: ElementKind((*children.split(), "param")) for tag, children in _C
 """The elements of a net that SUMO and the harness read. All others have params only."""
 
 
-def check_net(path: Path) -> None:
-    """Raise UsageError, with file and element, for an invalid net, or one that makes SUMO use other files."""
+def check_net(path: Path) -> ElementTree.Element:
+    """The root of a net. Raises UsageError, with file and element, for an invalid net, or one that makes SUMO use other
+    files."""
     root = parse_xml(path)
     if root.tag != "net":
         raise UsageError.of(path, str(root.tag), "is not a SUMO net: its root is not net", _REMEDY)
@@ -72,6 +73,7 @@ def check_net(path: Path) -> None:
         raise UsageError(problems)
     if too_large := _too_large(root):
         raise UsageError.of(path, "", too_large, "cut out the part that the scene needs")
+    return root
 
 
 def _named(element: ElementTree.Element) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -13,6 +14,7 @@ from sumolib.net import Net
 from sumolib.net.connection import Connection
 from sumolib.net.edge import Edge
 from sumolib.net.lane import Lane
+from sumolib.net.node import Node
 
 from harness.game.arrays import FloatArray
 from harness.game.junctions import Conflicts, Control, RightOfWay, StopLines, Streams
@@ -142,10 +144,10 @@ def _own_links(junction: JunctionOnRoute) -> list[tuple[Connection, float, float
 def foes_of(own: Connection) -> list[Connection]:
     """The links of the junction whose traffic may be in conflict with that of a link."""
     node = own.getJunction()
-    links = [link for link in node.getConnections() if carries_traffic(link) and link is not own]
+    links = [link for link in _carrying(node) if link is not own]
     try:
-        index = node.getLinkIndex(own)
-        return [link for link in links if node.areFoes(index, node.getLinkIndex(link))]
+        indices = _indices(node)
+        return [link for link in links if node.areFoes(indices[own], indices[link])]
     except (KeyError, IndexError):  # the net has no rules for the junction
         return [link for link in links if link.getFromLane() is not own.getFromLane()]
 
@@ -157,13 +159,30 @@ def yields_to(own: Connection, foe: Connection) -> tuple[bool, bool]:
     """
     node = own.getJunction()
     try:
-        own_yields, foe_yields = node.forbids(foe, own), node.forbids(own, foe)
+        own_yields, foe_yields = _forbids(node, foe, own), _forbids(node, own, foe)
     except (KeyError, IndexError):
         return False, False
     if not (own_yields and foe_yields):
         return own_yields, False
     own_major, foe_major = own.getState() in _MAJOR, foe.getState() in _MAJOR
     return (True, True) if own_major == foe_major else (foe_major, False)
+
+
+@lru_cache(maxsize=1)
+def _indices(node: Node) -> dict[Connection, int]:
+    """The index of each link from a road of a junction. sumolib searches through all of them for one."""
+    return {link: node.getLinkIndex(link) for link in node.getConnections() if not link.getFrom().isSpecial()}
+
+
+@lru_cache(maxsize=1)
+def _carrying(node: Node) -> list[Connection]:
+    return [link for link in node.getConnections() if carries_traffic(link)]
+
+
+def _forbids(node: Node, link: Connection, other: Connection) -> bool:
+    """`Node.forbids`, without its searches: whether a link makes another one yield."""
+    index, other_index = _indices(node)[link], _indices(node)[other]
+    return index >= 0 <= other_index and node._prohibits[other_index][-index - 1] == "1"
 
 
 def extent_of(line: shapely.LineString, overlap: BaseGeometry) -> tuple[float, float]:

@@ -78,7 +78,7 @@ def route_line(net: Net, edges: Sequence[Edge], lanes_of: LanesOf = car_lanes) -
 
     Raises ValueError if consecutive edges are not connected.
     """
-    points, starts = _join([piece.line for piece in _pieces(net, edges, lanes_of)])
+    points, starts = _join(_lines(net, edges, _links(edges, lanes_of), lanes_of))
     return points, starts.tolist()
 
 
@@ -165,22 +165,33 @@ def way_table(way: FloatArray, area: BaseGeometry) -> Route:
 # --- the line --------------------------------------------------------------------------------------------------------
 
 
+def _lines(net: Net, edges: Sequence[Edge], links: Sequence[Connection], lanes_of: LanesOf) -> list[FloatArray]:
+    """The sections [n, 2] of the line of a route with these connections: over an edge, over its junction, and so on."""
+    entries, exits = _entries(edges, links, lanes_of), [link.getFromLane() for link in links]
+    lines = [_between(*ends) for ends in zip(entries, [*exits, entries[-1]], strict=True)]
+    for k, link in enumerate(links):
+        lines.insert(2 * k + 1, line_over_junction(net, link))
+    return lines
+
+
+def _entries(edges: Sequence[Edge], links: Sequence[Connection], lanes_of: LanesOf) -> list[Lane]:
+    """The lane at the start of each edge of a route."""
+    first = links[0].getFromLane() if links else lanes_of(edges[0])[-1]
+    return [first, *(link.getToLane() for link in links)]
+
+
 def _pieces(net: Net, edges: Sequence[Edge], lanes_of: LanesOf) -> list[_Piece]:
     links = _links(edges, lanes_of)
-    entries = [link.getToLane() for link in links]
-    exits = [link.getFromLane() for link in links]
-    entries.insert(0, exits[0] if exits else lanes_of(edges[0])[-1])
-    exits.append(entries[-1])
+    entries, lines = _entries(edges, links, lanes_of), _lines(net, edges, links, lanes_of)
     pieces = []
     for k, edge in enumerate(edges):
         lanes = [(lane_line(lane), lane) for lane in lanes_of(edge)]
-        line = _between(entries[k], exits[k])
-        pieces.append(_Piece(line=line, lanes=lanes, edge=k, speed_mps=entries[k].getSpeed()))
+        pieces.append(_Piece(line=lines[2 * k], lanes=lanes, edge=k, speed_mps=entries[k].getSpeed()))
         if k < len(links):
             between = _links_between(edge, edges[k + 1], lanes_of)
             lanes = [(line_over_junction(net, link), link.getToLane()) for link in between]
             speed_mps = [*inner_lanes(net, links[k]), links[k].getToLane()][0].getSpeed()
-            line = line_over_junction(net, links[k])
+            line = lines[2 * k + 1]
             pieces.append(_Piece(line=line, lanes=lanes, edge=k + 1, speed_mps=speed_mps, is_junction=True))
     return pieces
 
@@ -327,7 +338,7 @@ def meeting_of_lines(ego_points: FloatArray, other_points: FloatArray) -> Meetin
     """The first place where two lines, of points [n, 2] every `SPACING_M`, meet; None if they do not."""
     from scipy.spatial import KDTree  # loads SciPy's sparse matrices: only for commands that open a scene
 
-    distances, rows = KDTree(other_points).query(ego_points)
+    distances, rows = KDTree(other_points).query(ego_points, distance_upper_bound=_MEETS_M)
     near = np.flatnonzero(distances < _MEETS_M)
     if not len(near):
         return None

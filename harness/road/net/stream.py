@@ -40,11 +40,15 @@ class Feeders:
 
     def __init__(self, net: Net) -> None:
         self.net = net
-        self._into: dict[str, list[Connection]] = {}
-        for edge in net.getEdges(withInternal=False):
+
+    @cached_property
+    def _into(self) -> dict[str, list[Connection]]:
+        into: dict[str, list[Connection]] = {}
+        for edge in self.net.getEdges(withInternal=False):
             for links in edge.getOutgoing().values():
                 for link in filter(carries_traffic, links):
-                    self._into.setdefault(link.getToLane().getID(), []).append(link)
+                    into.setdefault(link.getToLane().getID(), []).append(link)
+        return into
 
     def approaches(self, lane: Lane, along_m: float = 0.0, seen: frozenset[str] = frozenset()) -> Iterator[Piece]:
         """The lines that lead to the end of a lane, which is at `along_m` of a stream, nearest first."""
@@ -81,6 +85,7 @@ class Stream:
     def __init__(self, link: Connection, feeders: Feeders) -> None:
         self.link, self._feeders = link, feeders
         self.width_m = float(link.getFromLane().getWidth())
+        self._swept: dict[bool, BaseGeometry] = {}
 
     @cached_property
     def inner(self) -> shapely.LineString:
@@ -109,8 +114,10 @@ class Stream:
 
     def swept(self, beyond: bool) -> BaseGeometry:
         """The area that cars on the link need inside the junction and, if wanted, shortly beyond it."""
-        line = self.onward if beyond else self.inner
-        return line.buffer(min(CORRIDOR_M, self.width_m) / 2.0, cap_style="flat", join_style="mitre")
+        if beyond not in self._swept:
+            line, half_m = self.onward if beyond else self.inner, min(CORRIDOR_M, self.width_m) / 2.0
+            self._swept[beyond] = line.buffer(half_m, cap_style="flat", join_style="mitre")
+        return self._swept[beyond]
 
     @cached_property
     def samples(self) -> FloatArray:

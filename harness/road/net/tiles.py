@@ -36,7 +36,7 @@ def write_tiles(
 
     With `junctions`, only these junctions of the net and their edges are copied.
     """
-    root = parse_xml(net_file)
+    root = parse_xml(net_file, None if junctions is None else _at(set(junctions)))
     elements = list(root) if junctions is None else list(_cut(root, set(junctions)))
     with file.open("w", encoding="utf-8") as out:
         attributes = {name: value for name, value in root.attrib.items() if not name.startswith("{")}
@@ -84,10 +84,26 @@ def _written(attributes: dict[str, str]) -> str:
     return "".join(f" {name}={quoteattr(value)}" for name, value in attributes.items())
 
 
+def _at(kept: set[str]) -> Callable[[ElementTree.Element], bool]:
+    """Whether an edge is at junctions that are kept, and a connection from such an edge; true of most others. A net has
+    its edges before their connections."""
+    edges: set[str] = set()
+
+    def is_at(element: ElementTree.Element) -> bool:
+        name = element.get("id", "")
+        if element.tag == "edge" and (kept & {element.get("from"), element.get("to")} or _junction_of(name) in kept):
+            edges.add(name)
+        if element.tag == "junction" and name.startswith(":"):
+            return _junction_of(name.rsplit("_", 1)[0]) in kept
+        return name in edges if element.tag == "edge" else element.tag != "connection" or element.get("from") in edges
+
+    return is_at
+
+
 def _cut(root: ElementTree.Element, kept: set[str]) -> Iterator[ElementTree.Element]:
+    """The elements of a net with the edges at the junctions `kept` alone."""
     ends = {edge.get("id", ""): (edge.get("from"), edge.get("to")) for edge in root.findall("edge")}
-    edges = {name for name, both in ends.items() if kept & set(both) or _junction_of(name) in kept}
-    outer = {end for name in edges for end in ends[name] if end} - kept
+    outer = {end for both in ends.values() for end in both if end} - kept
 
     def is_kept(link: ElementTree.Element) -> bool:
         name = link.get("from", "")
@@ -98,15 +114,12 @@ def _cut(root: ElementTree.Element, kept: set[str]) -> Iterator[ElementTree.Elem
     for element in root:
         name = element.get("id", "")
         if element.tag == "junction":
-            if name in kept or (name.startswith(":") and _junction_of(name.rsplit("_", 1)[0]) in kept):
+            if name in kept or name.startswith(":"):
                 yield element
             elif name in outer:
-                yield _dead_end(element, edges)
+                yield _dead_end(element, ends)
         elif element.tag == "connection":
             if is_kept(element):
-                yield element
-        elif element.tag == "edge":
-            if name in edges:
                 yield element
         elif element.tag == "tlLogic":
             if name in signals:

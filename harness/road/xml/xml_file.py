@@ -11,6 +11,7 @@ import io
 import math
 import re
 import zlib
+from collections.abc import Callable
 from math import inf
 from pathlib import Path
 from xml.etree import ElementTree
@@ -31,8 +32,11 @@ _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 _XSI = "{http://www.w3.org/2001/XMLSchema-instance}"
 
 
-def parse_xml(path: Path) -> ElementTree.Element:
-    """The root of an XML file. Raises UsageError if the file is missing, malformed or has entities."""
+def parse_xml(path: Path, is_kept: Callable[[ElementTree.Element], bool] | None = None) -> ElementTree.Element:
+    """The root of an XML file, if given only with those of its children that are kept.
+
+    Raises UsageError if the file is missing, malformed or has entities.
+    """
     try:
         content = xml_bytes(path)
     except FileNotFoundError:
@@ -47,7 +51,11 @@ def parse_xml(path: Path) -> ElementTree.Element:
         declared = _ENCODING.match(text)
         if declared and declared[1].lower() not in ("utf-8", "us-ascii"):
             raise ValueError(f"its declared encoding is {declared[1]}")
-        root: ElementTree.Element = SafeElementTree.fromstring(content, forbid_dtd=True)
+        parser = SafeElementTree.XMLParser(
+            forbid_dtd=True, target=_Builder(is_kept) if is_kept else ElementTree.TreeBuilder()
+        )
+        parser.feed(content)
+        root: ElementTree.Element = parser.close()
     except DefusedXmlException as error:
         message = f"carries XML entities or a document type: {error}"
         raise UsageError.of(path, "", message, "remove them") from None
@@ -57,6 +65,25 @@ def parse_xml(path: Path) -> ElementTree.Element:
         raise UsageError.of(path, "", f"is not readable XML: {error}", _REMEDY) from None
     _check_schema_names(path, root)
     return root
+
+
+class _Builder(ElementTree.TreeBuilder):
+    """Builds a tree without the children of the root that are not kept, which takes less memory."""
+
+    def __init__(self, is_kept: Callable[[ElementTree.Element], bool]) -> None:
+        super().__init__()
+        self._is_kept, self._open = is_kept, list[ElementTree.Element]()
+
+    def start(self, tag: str, attrs: dict[str, str], /) -> ElementTree.Element:
+        self._open.append(super().start(tag, attrs))
+        return self._open[-1]
+
+    def end(self, tag: str, /) -> ElementTree.Element:
+        element = super().end(tag)
+        self._open.pop()
+        if len(self._open) == 1 and not self._is_kept(element):
+            del self._open[0][-1]
+        return element
 
 
 def xml_bytes(path: Path, most_bytes: int = MOST_BYTES) -> bytes:
