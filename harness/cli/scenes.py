@@ -207,6 +207,7 @@ def _show(opened: OpenMap, plans: Sequence[GamePlan], console: Console) -> None:
     console.print(plan_table([(plan, opened.place_of(plan)) for plan in plans]), highlight=False)
     counts = Counter(plan.candidate.kind.value for plan in opened.plans)
     print_plain(["in all: " + ", ".join(f"{count} {kind}" for kind, count in counts.items())], console)
+    print_plain([opened.note] if opened.note else [], console)
     print_plain([f"left out: {count} ({reason})" for reason, count in sorted(opened.left_out.items())], console)
 
 

@@ -41,6 +41,7 @@ _ALL_TURNS_DEG = 360.0  # of both routes, beside which the score is halved
 _BRAKING_MPS2, _REACTION_S = 3.0, 1.0  # of a driver who sees a stop line at the start
 _SPARE_S = 8.0
 _TIME_LIMITS_S = (30.0, 300.0)
+_CAR_MPS = 40.0  # highest speed of a car, or more where the limit is high
 _SHOWN = 100  # conflicts from one line of progress to the next
 
 
@@ -91,6 +92,11 @@ class GamePlan:
         turns_deg = sum(sum(route.turns_deg) for route in (self.ego_route, self.person_route) if route is not None)
         return 100.0 * sharp * self.approach / (1.0 + turns_deg / _ALL_TURNS_DEG)
 
+    @property
+    def car_speed_mps(self) -> float:
+        """The highest speed of the players' cars: above that of any start."""
+        return float(np.ceil(max(_CAR_MPS, self.ego.speed_mps[1], self.person.speed_mps[1])))
+
     def time_limit_s(self, reds_s: Mapping[str, float]) -> float:
         """Time enough for both from their farthest starts, at the speed of the slowest, and for the longest red of each
         traffic light on their ways, by its id."""
@@ -130,7 +136,10 @@ class Plans:
             for k, candidate in enumerate(listed):
                 if k % _SHOWN == 0:
                     self._show(f"planning games: {k:,} of {len(listed):,} conflicts")
-                plan = self._plan(candidate)
+                try:
+                    plan = self._plan(candidate)
+                except (ArithmeticError, LookupError, ValueError, shapely.errors.ShapelyError) as error:
+                    plan = f"lanes that can't be used{_EXAMPLE}{candidate.first.start.getID()}: {error}"
                 if isinstance(plan, GamePlan):
                     found.append(plan)
                 else:

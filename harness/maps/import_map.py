@@ -6,6 +6,8 @@ import errno
 import re
 from dataclasses import replace
 from pathlib import Path
+from signal import Signals
+from typing import NamedTuple
 
 import numpy as np
 import sumo
@@ -32,11 +34,27 @@ _OSM_OPTIONS = (
     *("--osm.turn-lanes", "--osm.sidewalks", "--osm.crossings", "--walkingareas"),
     *("--keep-edges.by-vclass", "passenger"),
 )
+_LEFT_OUT = {  # one after the other, if netconvert crashes
+    "--osm.crossings": "pedestrian crossings",
+    "--walkingareas": "pavements inside junctions",
+    "--osm.sidewalks": "pavements",
+    "--osm.turn-lanes": "marked turn lanes",
+    "--tls.join": "joined traffic lights",
+    "--junctions.join": "joined junctions",
+}
 _OPENDRIVE_OPTIONS = ("--no-turnarounds", "--geometry.max-grade.fix", "false")
 
 
-def import_map(path: Path, folder: Path, *, left_hand: bool) -> tuple[Path, Net]:
-    """The net of a map, and its file in `folder`: a net as it is, another map converted.
+class ImportedMap(NamedTuple):
+    """The net of a map, its file, and what the conversion had to leave out, in one line, or empty."""
+
+    net_file: Path
+    net: Net
+    note: str = ""
+
+
+def import_map(path: Path, folder: Path, *, left_hand: bool) -> ImportedMap:
+    """The net of a map, in `folder`: a net as it is, another map converted.
 
     `left_hand`: traffic in an OpenStreetMap file keeps to the left; other maps say it themselves.
 
@@ -46,9 +64,11 @@ def import_map(path: Path, folder: Path, *, left_hand: bool) -> tuple[Path, Net]
     if kind is MapKind.NET:
         return _copied(path, folder, left_hand)
     facts = facts_of(path, kind)
+    if kind is MapKind.OSM and facts.on_the_left and not left_hand:
+        raise UsageError.of(path, "", f"{facts.on_the_left}: traffic keeps to the left", "give --left-hand")
     is_left = left_hand if kind is MapKind.OSM else _is_left(path, facts, left_hand)
     file = folder / "converted.net.xml"
-    _convert(path, kind, facts=facts, net_file=file, left_hand=is_left)
+    note = _convert(path, kind, facts=facts, net_file=file, left_hand=is_left)
     try:
         check_net(file)
     except UsageError as error:  # about a file that the user does not know
@@ -58,10 +78,10 @@ def import_map(path: Path, folder: Path, *, left_hand: bool) -> tuple[Path, Net]
     except UsageError:
         raise UsageError.of(path, "", *_NO_ROAD) from None
     _check_rotation(path, net, is_left)
-    return file, net
+    return ImportedMap(file, net, note)
 
 
-def _copied(path: Path, folder: Path, left_hand: bool) -> tuple[Path, Net]:
+def _copied(path: Path, folder: Path, left_hand: bool) -> ImportedMap:
     try:
         check_file(path, MOST_BYTES)
     except OSError as error:
@@ -70,7 +90,7 @@ def _copied(path: Path, folder: Path, left_hand: bool) -> tuple[Path, Net]:
     _check_own_net(path, left_hand)
     file = folder / "converted.net.xml"
     file.write_bytes(xml_bytes(path))
-    return file, read_net(path)
+    return ImportedMap(file, read_net(path))
 
 
 def _check_own_net(path: Path, left_hand: bool) -> None:
@@ -85,7 +105,8 @@ def _check_own_net(path: Path, left_hand: bool) -> None:
         raise UsageError.of(path, "junction", message, "build it again with netconvert or netedit")
 
 
-def _convert(path: Path, kind: MapKind, *, facts: MapFacts, net_file: Path, left_hand: bool) -> None:
+def _convert(path: Path, kind: MapKind, *, facts: MapFacts, net_file: Path, left_hand: bool) -> str:
+    """Write the net of a map. Returns a line on the options that had to be left out; empty if there are none."""
     source = net_file.with_name("map.xml")  # netconvert splits names at commas and blanks
     source.write_bytes(xml_bytes(path, MOST_BYTES))
     options = ["--xml-validation", "never", "--output-file", net_file.name, "--aggregate-warnings", "1", *_LIGHTS]
@@ -97,16 +118,27 @@ def _convert(path: Path, kind: MapKind, *, facts: MapFacts, net_file: Path, left
     else:
         options += ["--opendrive-files", source.name, *_OPENDRIVE_OPTIONS]
     options += ["--lefthand"] if left_hand else []
-    finished = run_program("netconvert", options, net_file.parent, _PATIENCE_S)
+    optional, crash, left_out = [each for each in _LEFT_OUT if each in options], "", list[str]()
+    while True:
+        finished = run_program("netconvert", options, net_file.parent, _PATIENCE_S)
+        if finished is None or finished.returncode >= 0 or not optional:
+            break
+        crash = crash or f"netconvert ended by signal {Signals(-finished.returncode).name} with {optional[0]}"
+        left_out.append(_LEFT_OUT[optional[0]])
+        options.remove(optional.pop(0))
     source.unlink()
     if finished is None:
         raise UsageError.of(path, "", f"netconvert takes longer than {_PATIENCE_S:g} s", "cut out a smaller part")
     if "No edges loaded" in finished.stderr:
         raise UsageError.of(path, "", *_NO_ROAD)
+    if finished.returncode < 0:
+        name = Signals(-finished.returncode).name
+        raise UsageError.of(path, "", f"netconvert ended by signal {name}", "export the map again, or a smaller part")
     if finished.returncode or not net_file.is_file():
         errors = re.findall(r"^Error: (.*)$", finished.stderr, re.MULTILINE) or ["it gives no reason"]
         message = f"netconvert can't convert it: {errors[0].replace(source.name, path.name)}"
         raise UsageError.of(path, "", message, "repair the map, or export it again")
+    return f"{crash}; converted without {', '.join(left_out)}" if left_out else ""
 
 
 def _is_left(path: Path, facts: MapFacts, left_hand: bool) -> bool:

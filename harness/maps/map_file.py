@@ -9,6 +9,7 @@ import io
 import math
 from dataclasses import dataclass, field
 from enum import Enum
+from math import inf
 from pathlib import Path
 from xml.etree.ElementTree import Element, ParseError
 
@@ -36,6 +37,7 @@ _NUMBERS: dict[str, tuple[str, ...]] = {  # attributes of OpenDRIVE from which n
     "laneSection": ("s",),
     "width": ("sOffset", *_CUBIC),
 }
+_ISLES_DEG = (49.85, 50.0, 51.05)  # south ends of Great Britain and Ireland, up to 0, 1 and 1.78 degrees east
 _OPEN_ROAD = "-1"  # the junction of an OpenDRIVE road outside junctions
 _DRIVING = ("driving", "bidirectional", "entry", "exit", "onRamp", "offRamp")  # lanes of OpenDRIVE
 
@@ -53,12 +55,25 @@ class MapFacts:
     """What a map says of itself."""
 
     roads: int = 0
+    lowest_deg: tuple[float, float] = (inf, inf)  # latitude and longitude of the nodes of an OpenStreetMap file
+    highest_deg: tuple[float, float] = (-inf, -inf)
+    says_left: bool = False  # it has a tag driving_side=left
     has_layers: bool = False  # some roads of an OpenStreetMap file pass over or under others
     rules: set[str] = field(default_factory=set)  # RHT and LHT, of the roads of an OpenDRIVE file
     broken: tuple[str, str] | None = None  # the first road of an OpenDRIVE file that is not sound, and why
     uneven: str = ""  # the first road with left-hand traffic whose two directions have different lanes
     junctions: set[str] = field(default_factory=lambda: {_OPEN_ROAD})  # of an OpenDRIVE file
     road_within: dict[str, str] = field(default_factory=dict)  # the first road of each junction that roads name
+
+    @property
+    def on_the_left(self) -> str:
+        """Why traffic in an OpenStreetMap file keeps to the left; empty if nothing says so."""
+        if self.says_left:
+            return "has the tag driving_side=left"
+        (south, west), (north, east) = self.lowest_deg, self.highest_deg
+        ends = zip(_ISLES_DEG, (0.0, 1.0, 1.78), strict=True)
+        inside = any(low <= south and north <= 61.0 and west >= -10.8 and east <= end for low, end in ends)
+        return "lies in Great Britain or Ireland" if inside else ""
 
 
 def kind_of(path: Path) -> MapKind:
@@ -107,6 +122,12 @@ def facts_of(path: Path, kind: MapKind) -> MapFacts:
 
 
 def _note_osm(element: Element, facts: MapFacts) -> None:
+    if element.tag == "node":
+        place = number_of(element.get("lat", "")), number_of(element.get("lon", ""))
+        facts.lowest_deg = min(facts.lowest_deg[0], place[0]), min(facts.lowest_deg[1], place[1])
+        facts.highest_deg = max(facts.highest_deg[0], place[0]), max(facts.highest_deg[1], place[1])
+    if element.tag in ("way", "relation"):
+        facts.says_left |= any(tag.attrib == {"k": "driving_side", "v": "left"} for tag in element.iter("tag"))
     if element.tag == "way":
         tags = {each.get("k"): each.get("v", "") for each in element.iter("tag")}
         is_road = tags.get("highway") in _FOR_CARS
@@ -123,6 +144,8 @@ def _note_opendrive(element: Element, facts: MapFacts) -> None:
     """
     if element.tag == "junction":
         facts.junctions.add(element.get("id", ""))
+        if element.get("type") == "direct":
+            facts.broken = facts.broken or (f"junction {element.get('id')}", "is a direct junction, which is not read")
     elif element.tag == "road":
         name, rule = element.get("id", ""), element.get("rule", "RHT")
         facts.rules.add(rule)

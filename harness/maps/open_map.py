@@ -34,6 +34,7 @@ class OpenMap:
     net_file: Path
     plans: Sequence[GamePlan]
     left_out: dict[str, int]  # reason and number of conflicts of which no scene can be made
+    note: str  # what the conversion had to leave out; empty if nothing
     net: Net = field(repr=False)
 
     @cached_property
@@ -73,7 +74,7 @@ def open_map(source: Path, folder: Path, *, left_hand: bool, show: Callable[[str
 
     Raises UsageError for a map on which no game can be made.
     """
-    net_file, net = import_map(source, folder, left_hand=left_hand)
+    net_file, net, note = import_map(source, folder, left_hand=left_hand)
     plans = Plans(net, show)
     if not plans.all:
         reasons = "; ".join(f"{reason}: {count}" for reason, count in sorted(plans.left_out.items()))
@@ -85,6 +86,7 @@ def open_map(source: Path, folder: Path, *, left_hand: bool, show: Callable[[str
         net=net,
         plans=plans.all,
         left_out=plans.left_out,
+        note=note,
     )
 
 

@@ -23,6 +23,7 @@ from harness.road.net.route_table import route_line
 BEYOND_M = 45.0  # of the goal behind the junction
 _ROOM_M = 8.0  # behind a goal, at the end of the last edge
 _NEAREST_GOAL_M = 12.0
+_INTO_M = 10.0  # of the edge of a goal, at least
 _MOST_EDGES = 40
 _FOLLOWING_S, _AHEAD_M = 15.0, 75.0  # from the farthest start of the player ahead
 _BEND_COST, _YIELD_COST, _RING_COST = 2.0, 1.0, 3.0
@@ -99,11 +100,13 @@ def _with_goal(net: Net, edges: Sequence[Edge], place: int) -> PlannedRoute | No
     begin_m = starts[2 * place + 2] if has_junction else 0.0
     before = edges[: place + 1]
     limit_mps = min(edge.getSpeed() for edge in before)
-    goal_m = min(begin_m + BEYOND_M if has_junction else following_m(limit_mps), length_m - _ROOM_M)
-    if goal_m < begin_m + _NEAREST_GOAL_M:
+    wanted_m = min(begin_m + BEYOND_M if has_junction else following_m(limit_mps), length_m - _ROOM_M)
+    spots = [(min(max(wanted_m, starts[2 * k] + _INTO_M), end_m), k) for k, end_m in enumerate(ends)]
+    last_m = length_m - _ROOM_M
+    spots = [(m, k) for m, k in spots if starts[2 * k] + _INTO_M <= m <= last_m and m >= begin_m + _NEAREST_GOAL_M]
+    if not spots:
         return None
-    k = next(index for index, end_m in enumerate(ends) if goal_m <= end_m)
-    goal_m = max(goal_m, starts[2 * k] + 1.0)  # a goal is on an edge
+    goal_m, k = min(spots, key=lambda spot: abs(spot[0] - wanted_m))
     share = (goal_m - starts[2 * k]) / max(ends[k] - starts[2 * k], 1e-9)
     return PlannedRoute(
         edges=tuple(edge.getID() for edge in edges),

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from harness.game.road import SPACING_M
+from harness.maps import game_plans
 from harness.maps.candidates import Candidate, CandidateKind, Priority, candidates, following
 from harness.maps.game_plans import GamePlan, Plans
 from harness.maps.import_map import import_map
+from harness.maps.planned_routes import PlannedRoute, planned_route
 from harness.road.net.network import read_net
 from tests.support.repository import REPOSITORY
 from tests.support.scenes import CROSSING_EDGES, CROSSING_NODES, STRAIGHT_EDGES, STRAIGHT_NODES
@@ -21,7 +24,7 @@ MAPS = REPOSITORY / "tests" / "data" / "maps"
 
 @pytest.fixture(scope="module")
 def town(tmp_path_factory: pytest.TempPathFactory) -> Plans:
-    return Plans(import_map(MAPS / "town.osm", tmp_path_factory.mktemp("town"), left_hand=False)[1])
+    return Plans(import_map(MAPS / "town.osm", tmp_path_factory.mktemp("town"), left_hand=False).net)
 
 
 def found_in(net_file: Path) -> list[Candidate]:
@@ -157,6 +160,49 @@ def test_plans__what_is_left_out_has_a_reason(edges: str, reason: str, build_net
     plans = Plans(read_net(build_net(CROSSING_NODES, edges, "", "--no-turnarounds")))
     assert plans.all == []
     assert [each for each in plans.left_out if each.startswith(reason)]
+
+
+def test_plans__one_that_cannot_be_made_leaves_the_others(
+    build_net: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[PlannedRoute | None] = []
+
+    def planned(*given: Any) -> PlannedRoute | None:
+        made.append(planned_route(*given))
+        if len(made) == 1:
+            raise ValueError("no length")
+        return made[-1]
+
+    monkeypatch.setattr(game_plans, "planned_route", planned)
+    plans = Plans(read_net(build_net(CROSSING_NODES, CROSSING_EDGES, "", "--no-turnarounds")))
+    assert len(plans.all) == 2
+    assert plans.left_out == {"lanes that can't be used, such as wc_0: no length": 1}
+
+
+SLIVERS = (
+    '<node id="a" x="0" y="0"/><node id="s" x="200" y="-200"/><node id="b" x="200" y="0"/>'
+    '<node id="c" x="245" y="0"/><node id="d" x="250" y="0"/><node id="e" x="400" y="0"/>'
+)
+
+
+# 45 m behind the junction is the edge from c to d, which is 5 m long
+def test_plans__a_goal_is_10_m_from_the_start_of_its_edge(build_net: Callable[..., Path]) -> None:
+    edges = "".join(TO_STUBS.format(*each) for each in ("ab", "sb", "bc", "cd", "de"))
+    plans = Plans(read_net(build_net(SLIVERS, edges, "", "--no-turnarounds"))).all
+    assert plans
+    for plan in plans:
+        assert plan.ego_route.goal_edge in ("bc", "de")
+        assert plan.ego_route.goal_position_m >= 10.0
+
+
+# a start at up to 95 % of 50 m/s is faster than the 40 m/s that a car reaches elsewhere
+@pytest.mark.parametrize(("limit_mps", "car_mps"), [(30.0, 40.0), (50.0, 48.0)])
+def test_plans__a_car_reaches_the_speeds_of_its_road(
+    limit_mps: float, car_mps: float, build_net: Callable[..., Path]
+) -> None:
+    edges = f'<edge id="ab" from="a" to="b" speed="{limit_mps}"/>'
+    (plan,) = Plans(read_net(build_net('<node id="a" x="0" y="0"/><node id="b" x="2000" y="0"/>', edges))).all
+    assert plan.car_speed_mps == car_mps
 
 
 STUBS = (

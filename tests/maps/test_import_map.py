@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import re
+import shlex
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import sumo
 from sumolib.net import Net
 
 from harness.errors import UsageError
@@ -19,7 +22,7 @@ CROSS = REPOSITORY / "networks" / "priority_crossing" / "priority_crossing.net.x
 
 @pytest.fixture(scope="module")
 def town(tmp_path_factory: pytest.TempPathFactory) -> Net:
-    return import_map(TOWN, tmp_path_factory.mktemp("town"), left_hand=False)[1]
+    return import_map(TOWN, tmp_path_factory.mktemp("town"), left_hand=False).net
 
 
 def written(folder: Path, name: str, text: str) -> Path:
@@ -37,19 +40,19 @@ def test_import__of_openstreetmap_keeps_names_widths_and_limits(town: Net) -> No
 
 
 def test_import__of_openstreetmap_keeps_the_projection(tmp_path: Path) -> None:
-    file, _ = import_map(TOWN, tmp_path, left_hand=False)
+    file = import_map(TOWN, tmp_path, left_hand=False).net_file
     assert 'projParameter="+proj=utm +zone=32' in file.read_text(encoding="utf-8")
 
 
 def test_import__of_opendrive_keeps_widths_and_heights(tmp_path: Path) -> None:
-    _, net = import_map(JUNCTION, tmp_path, left_hand=False)
+    net = import_map(JUNCTION, tmp_path, left_hand=False).net
     west = net.getEdge("-1").getLane(0)
     assert west.getWidth() == 3.25
     assert [round(point[2], 2) for point in west.getShape3D()] == [0.0, 3.0]  # 200 m with a slope of 1.5 %
 
 
 def test_import__a_net_stays_as_it_is(tmp_path: Path) -> None:
-    file, _ = import_map(CROSS, tmp_path, left_hand=False)
+    file = import_map(CROSS, tmp_path, left_hand=False).net_file
     assert file.read_bytes() == CROSS.read_bytes()
 
 
@@ -60,7 +63,7 @@ def mirrored(text: str) -> str:
 
 def test_import__left_hand_traffic_of_openstreetmap_must_be_said(tmp_path: Path) -> None:
     left = written(tmp_path, "left.osm", mirrored(TOWN.read_text(encoding="utf-8")))
-    file, _ = import_map(left, tmp_path, left_hand=True)
+    file = import_map(left, tmp_path, left_hand=True).net_file
     assert 'lefthand="true"' in file.read_text(encoding="utf-8")
     with pytest.raises(UsageError, match=r"run clockwise: traffic keeps to the left \(give --left-hand\)"):
         import_map(left, tmp_path, left_hand=False)
@@ -72,7 +75,7 @@ def test_import__left_hand_traffic_of_opendrive_is_kept_or_refused(tmp_path: Pat
     text = JUNCTION.read_text(encoding="utf-8")
     straight = text[: text.index('  <road name="" ')] + "</OpenDRIVE>"  # without the roads inside the junction
     two_way = written(tmp_path, "two_way.xodr", straight.replace("RHT", "LHT"))
-    file, net = import_map(two_way, tmp_path, left_hand=False)
+    file, net, _ = import_map(two_way, tmp_path, left_hand=False)
     assert 'lefthand="true"' in file.read_text(encoding="utf-8")
     eastward, westward = (net.getEdge(name).getLane(0).getShape()[0][1] for name in ("-1", "1"))
     assert eastward > westward
@@ -117,7 +120,72 @@ def test_import__a_map_of_a_country_is_refused_by_its_own_name(tmp_path: Path) -
 
 def test_import__a_name_with_commas_and_blanks_is_one_name(tmp_path: Path) -> None:
     odd = written(tmp_path, "a, b=<c>.xodr", JUNCTION.read_text(encoding="utf-8"))
-    assert import_map(odd, tmp_path, left_hand=False)[1].hasEdge("-1")
+    assert import_map(odd, tmp_path, left_hand=False).net.hasEdge("-1")
+
+
+@pytest.fixture
+def crashing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
+    """Makes netconvert crash whenever its options have a text."""
+
+    def install(text: str) -> None:
+        home, real = tmp_path / "sumo", Path(sumo.SUMO_HOME)
+        (home / "bin").mkdir(parents=True)
+        (home / "data").symlink_to(real / "data")
+        program = home / "bin" / "netconvert"
+        netconvert = shlex.quote(str(real / "bin" / "netconvert"))
+        program.write_text(f'#!/bin/sh\ncase "$*" in *{text}*) kill -SEGV $$;; esac\nexec {netconvert} "$@"\n')
+        program.chmod(0o755)
+        monkeypatch.setattr(sumo, "SUMO_HOME", str(home))
+
+    return install
+
+
+def test_import__a_crash_of_netconvert_leaves_out_the_option_that_it_comes_from(
+    tmp_path: Path, crashing: Callable[[str], None]
+) -> None:
+    crashing("--osm.crossings")
+    _, net, note = import_map(TOWN, tmp_path, left_hand=False)
+    assert note == "netconvert ended by signal SIGSEGV with --osm.crossings; converted without pedestrian crossings"
+    assert not any(edge.getFunction() == "crossing" for edge in net.getEdges())
+    lanes = [lane for edge in net.getEdges() for lane in edge.getLanes()]
+    assert any(lane.allows("pedestrian") and not lane.allows("passenger") for lane in lanes)
+
+
+@pytest.mark.parametrize("path", [TOWN, JUNCTION], ids=["OpenStreetMap", "OpenDRIVE"])
+def test_import__a_crash_of_netconvert_whatever_its_options_is_named(
+    path: Path, tmp_path: Path, crashing: Callable[[str], None]
+) -> None:
+    crashing("--output-file")
+    with pytest.raises(UsageError, match=r"netconvert ended by signal SIGSEGV \(export the map again"):
+        import_map(path, tmp_path, left_hand=False)
+
+
+def moved_west(text: str, west_deg: float) -> str:
+    return re.sub(r'lon="([\d.]+)"', lambda found: f'lon="{float(found[1]) - west_deg:.7f}"', text)
+
+
+@pytest.mark.parametrize(
+    ("tag", "west_deg", "message"),
+    [
+        ("", 11.0, r"lies in Great Britain or Ireland: traffic keeps to the left \(give --left-hand\)"),
+        ('<tag k="driving_side" v="left"/>', 0.0, "has the tag driving_side=left: traffic keeps to the left"),
+    ],
+)
+def test_import__left_hand_traffic_is_known_without_a_roundabout(
+    tag: str, west_deg: float, message: str, tmp_path: Path
+) -> None:
+    text = TOWN.read_text(encoding="utf-8").replace('<tag k="junction" v="roundabout"/>', "")
+    left = moved_west(text.replace("</way>", f"{tag}</way>"), west_deg)
+    file = written(tmp_path, "left.osm", left)
+    with pytest.raises(UsageError, match=message):
+        import_map(file, tmp_path, left_hand=False)
+    assert 'lefthand="true"' in import_map(file, tmp_path, left_hand=True).net_file.read_text(encoding="utf-8")
+
+
+def test_import__a_direct_junction_of_opendrive_is_refused_by_its_name(tmp_path: Path) -> None:
+    text = re.sub(r"<junction ", '<junction type="direct" ', JUNCTION.read_text(encoding="utf-8"), count=1)
+    with pytest.raises(UsageError, match=r"junction \d+: is a direct junction, which is not read"):
+        import_map(written(tmp_path, "direct.xodr", text), tmp_path, left_hand=False)
 
 
 @pytest.mark.parametrize(

@@ -32,6 +32,12 @@ def test_gzip__of_several_members_as_sumo_writes_them(tmp_path: Path) -> None:
     assert parse_xml(packed(tmp_path, gzip.compress(b"<net>") + gzip.compress(b"</net>"))).tag == "net"
 
 
+def test_xml__is_read_without_the_children_that_are_not_kept(tmp_path: Path) -> None:
+    (tmp_path / "a.xml").write_text('<net><edge id="a"><lane/></edge><edge id="b"/><junction id="c"/></net>')
+    root = parse_xml(tmp_path / "a.xml", lambda element: element.get("id") in ("a", "c"))
+    assert [(each.tag, len(each)) for each in root] == [("edge", 1), ("junction", 0)]
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [(b"<net/>", "is not a gzip file"), (gzip.compress(b"<net/>" * 99)[:-9], "is cut off: its gzip data has no end")],

@@ -64,11 +64,7 @@ def junctions_on_route(net: Net, edges: Sequence[Edge], lanes_of: LanesOf = car_
         return []
     _, starts = route_line(net, edges, lanes_of)
     return [
-        JunctionOnRoute(
-            link=link,
-            links=_links_between(edges[k], edges[k + 1], lanes_of),
-            begin_m=starts[2 * k + 1],
-        )
+        JunctionOnRoute(link=link, links=_links_between(edges[k], edges[k + 1], lanes_of), begin_m=starts[2 * k + 1])
         for k, link in enumerate(_links(edges, lanes_of))
     ]
 
@@ -167,11 +163,11 @@ def way_table(way: FloatArray, area: BaseGeometry) -> Route:
 
 def _lines(net: Net, edges: Sequence[Edge], links: Sequence[Connection], lanes_of: LanesOf) -> list[FloatArray]:
     """The sections [n, 2] of the line of a route with these connections: over an edge, over its junction, and so on."""
-    entries, exits = _entries(edges, links, lanes_of), [link.getFromLane() for link in links]
-    lines = [_between(*ends) for ends in zip(entries, [*exits, entries[-1]], strict=True)]
-    for k, link in enumerate(links):
-        lines.insert(2 * k + 1, line_over_junction(net, link))
-    return lines
+    entries = _entries(edges, links, lanes_of)
+    lines = []
+    for entry, link in zip(entries, links, strict=False):
+        lines += [_between(entry, link.getFromLane()), line_over_junction(net, link)]
+    return [*lines, lane_line(entries[-1])]
 
 
 def _entries(edges: Sequence[Edge], links: Sequence[Connection], lanes_of: LanesOf) -> list[Lane]:
@@ -191,8 +187,8 @@ def _pieces(net: Net, edges: Sequence[Edge], lanes_of: LanesOf) -> list[_Piece]:
             between = _links_between(edge, edges[k + 1], lanes_of)
             lanes = [(line_over_junction(net, link), link.getToLane()) for link in between]
             speed_mps = [*inner_lanes(net, links[k]), links[k].getToLane()][0].getSpeed()
-            line = lines[2 * k + 1]
-            pieces.append(_Piece(line=line, lanes=lanes, edge=k + 1, speed_mps=speed_mps, is_junction=True))
+            over = lines[2 * k + 1]
+            pieces.append(_Piece(line=over, lanes=lanes, edge=k + 1, speed_mps=speed_mps, is_junction=True))
     return pieces
 
 

@@ -46,11 +46,7 @@ def parse_xml(path: Path, is_kept: Callable[[ElementTree.Element], bool] | None 
         remedy = "name a plain file, or cut out the part that the scene needs"
         raise UsageError.of(path, "", f"is not readable XML: {error.strerror}", remedy) from None
     try:
-        # SUMO's parser and this one must read the same text: in other encodings they may differ
-        text = content.decode("utf-8-sig")
-        declared = _ENCODING.match(text)
-        if declared and declared[1].lower() not in ("utf-8", "us-ascii"):
-            raise ValueError(f"its declared encoding is {declared[1]}")
+        _check_encoding(content)
         parser = SafeElementTree.XMLParser(
             forbid_dtd=True, target=_Builder(is_kept) if is_kept else ElementTree.TreeBuilder()
         )
@@ -65,6 +61,13 @@ def parse_xml(path: Path, is_kept: Callable[[ElementTree.Element], bool] | None 
         raise UsageError.of(path, "", f"is not readable XML: {error}", _REMEDY) from None
     _check_schema_names(path, root)
     return root
+
+
+def _check_encoding(content: bytes) -> None:
+    """Raise ValueError unless a text is UTF-8: SUMO's parser and this one might read others differently."""
+    declared = _ENCODING.match(content.decode("utf-8-sig"))
+    if declared and declared[1].lower() not in ("utf-8", "us-ascii"):
+        raise ValueError(f"its declared encoding is {declared[1]}")
 
 
 class _Builder(ElementTree.TreeBuilder):
