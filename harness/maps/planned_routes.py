@@ -47,13 +47,7 @@ class PlannedRoute:
     limit_mps: float  # the lowest speed limit of the edges before the junction
     lights: tuple[tuple[float, str], ...]  # up to the junction: station and id of each traffic light
     turns_deg: tuple[float, ...]  # at each junction, without sign
-
-    @property
-    def refusal(self) -> str:
-        """The reason against a route on which no game is offered; empty if there is none."""
-        if max(self.turns_deg, default=0.0) > _SHARPEST_DEG:
-            return f"turns above {_SHARPEST_DEG:.0f} degrees"
-        return "" if shapely.LineString(self.line).is_simple else "loops"
+    refusal: str  # the reason against a route on which no game is offered; empty if there is none
 
     @property
     def line(self) -> FloatArray:
@@ -108,6 +102,7 @@ def _with_goal(net: Net, edges: Sequence[Edge], place: int) -> PlannedRoute | No
         return None
     goal_m, k = min(spots, key=lambda spot: abs(spot[0] - wanted_m))
     share = (goal_m - starts[2 * k]) / max(ends[k] - starts[2 * k], 1e-9)
+    turns_deg = tuple(_turn_deg(one, other) for one, other in pairwise(edges[: k + 1]))
     return PlannedRoute(
         edges=tuple(edge.getID() for edge in edges),
         points=points,
@@ -121,8 +116,15 @@ def _with_goal(net: Net, edges: Sequence[Edge], place: int) -> PlannedRoute | No
             for k, edge in enumerate(before)
             for name in sorted({link.getTLSID() for link in _onward(edge) if link.getTLSID()})
         ),
-        turns_deg=tuple(_turn_deg(one, other) for one, other in pairwise(edges[: k + 1])),
+        turns_deg=turns_deg,
+        refusal=_refusal(turns_deg, sampled_to(points, goal_m)),
     )
+
+
+def _refusal(turns_deg: Sequence[float], line: FloatArray) -> str:
+    if max(turns_deg, default=0.0) > _SHARPEST_DEG:
+        return f"turns above {_SHARPEST_DEG:.0f} degrees"
+    return "" if shapely.LineString(line).is_simple else "loops"
 
 
 def _turn_deg(before: Edge, behind: Edge) -> float:
