@@ -111,7 +111,9 @@ class GamePlan:
 def _seconds(route: PlannedRoute, from_m: float, reds_s: Mapping[str, float]) -> float:
     """Time from a station to the goal, at the lowest share of the speed limit and through red lights."""
     way_m = route.goal_m - from_m
-    return way_m / (_SHARES[0] * route.limit_mps) + sum(reds_s.get(name, 0.0) for at_m, name in route.lights if at_m > from_m)
+    return way_m / (_SHARES[0] * route.limit_mps) + sum(
+        reds_s.get(name, 0.0) for at_m, name in route.lights if at_m > from_m
+    )
 
 
 class Plans:
