@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import warnings
 from collections.abc import Callable
@@ -31,6 +32,7 @@ from tests.support.tiny import (
     TRAINING,
     carried_out,
     files_in,
+    harness,
     learned_run,
     tables,
     write_campaign,
@@ -280,6 +282,22 @@ def test_played__the_tables_are_those_of_the_full_campaign_to_the_byte(played: P
     assert (played / "manoeuvres.csv").read_bytes() == (learned_run() / "manoeuvres.csv").read_bytes()
     assert read_csv(played / "training.csv").empty
     assert files_in(played.parent / "policies") == files_in(learned_run() / "policies")  # nothing is written there
+
+
+@pytest.mark.slow
+def test_played__without_pytorch(tmp_path: Path) -> None:
+    """An ego by rules, whose parameters are searched, against a person who was trained before."""
+    for name in ("torch", "stable_baselines3"):
+        (tmp_path / "hidden" / name).mkdir(parents=True)
+        (tmp_path / "hidden" / name / "__init__.py").write_text("raise ImportError('it is hidden')")
+    shutil.copytree(learned_run() / "policies", tmp_path / "policies")
+    file = write_played(
+        tmp_path, ego={"driver": "adas", "persona": str(CAREFUL)}, reconfiguration={"trials": 2, "games": 2}
+    )
+    without = {**os.environ, "PYTHONPATH": str(tmp_path / "hidden")}
+    done = harness("campaign", file, "--out", tmp_path / "run", env=without)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (tmp_path / "run" / "report.html").is_file()
 
 
 @pytest.mark.slow
