@@ -5,7 +5,7 @@
 | shapes, bounds, finiteness | every decision: [N, 2] finite numbers in -1 to 1; the arguments are not modified |
 | determinism after `reset` | the same games again: the same actions, bit for bit |
 | independence of games | the observations of all games replayed at once, one game reset in between: the same actions |
-| time | of a decision, compared with the step of the scene; it is reported, and never a violation |
+| time | of the longest decision, compared with the step of the scene; it is reported, and never a violation |
 
 SUMO's own driver makes no decisions. For it the check is that the games can be played, and that playing them again
 gives the same motion, bit for bit.
@@ -69,6 +69,11 @@ class Findings:
     """Of the games."""
     seconds: list[float] = field(default_factory=list)
     """Of each decision."""
+    game_seconds: list[float] = field(default_factory=list)
+    """Of each game when it was played again: all is loaded."""
+    seconds_at_once: float | None = None
+    """Of a decision when the driver decided in all games at once: the median; None: not measured."""
+    tunable: bool = False
     title: str = ""
     """The driver and the scene."""
     step_s: float = 0.1
@@ -82,11 +87,11 @@ class Findings:
             *(f"  note   {each}" for each in self.notes),
         ]
         if self.seconds:
-            mean, longest = 1000 * sum(self.seconds) / len(self.seconds), 1000 * max(self.seconds)
-            pace = "faster" if mean < 1000 * self.step_s else "slower"
+            mean_s, longest_s = sum(self.seconds) / len(self.seconds), max(self.seconds)
+            pace = "faster" if longest_s < self.step_s else "slower"
             lines.append(
-                f"  time   {mean:.2f} ms per decision, {longest:.2f} ms at most: "
-                f"{pace} than the scene's step of {self.step_s:g} s"
+                f"  time   {1000 * longest_s:.2f} ms per decision at most: {pace} than the scene's step of "
+                f"{self.step_s:g} s; {1000 * mean_s:.2f} ms on average, {1 / mean_s:,.0f} decisions a second"
             )
         return [*lines, f"  games  {', '.join(self.outcomes)}"] if self.outcomes else lines
 
@@ -155,6 +160,7 @@ def check_named(written: str, scene: Path, games: int, *, allow_code: bool) -> F
         driver, title = external.make(car_of(opened.world, EGO), sampled=False), external.in_words
     findings = check_conformance(driver, opened, games)
     findings.notes += external.notes if external is not None else ()
+    findings.tunable = external is not None and bool(external.searched)
     findings.title, findings.step_s = f"{title}, on {opened.document.name}", opened.world.step_s
     return findings
 
@@ -192,12 +198,13 @@ def _play(driver: Driver, scene: OpenScene, games: int, *, findings: Findings, a
     players = len(scene.world.roles)
     start_distribution = scene.start_distribution([HumanFactors()] * players, [1.0] * players)
     checked, played, outcomes = _CheckedDriver(driver, findings.seconds), list[_PlayedGame](), list[str]()
+    findings.game_seconds = []
     arena = Arena(scene, 1, [Seat(checked), *[Seat(SumoDriver())] * (players - 1)])
     try:
         for game in range(games):
             parts = ("check-driver", game)
             start = draw_initial_state(start_distribution, *parts)
-            checked.decisions = []
+            checked.decisions, began = [], time.perf_counter()
             motion: list[FloatArray] = []
             try:
                 arena.reload(start.seed)
@@ -211,6 +218,7 @@ def _play(driver: Driver, scene: OpenScene, games: int, *, findings: Findings, a
             except Exception as error:  # a driver may raise any exception
                 where = f"{activity}, game {game}, decision {len(checked.decisions)}"
                 raise _Violation(f"{where}: it raised {type(error).__name__}: {error}") from error
+            findings.game_seconds.append(time.perf_counter() - began)
             played.append(_PlayedGame(checked.decisions, np.array(motion).reshape(-1, 4)))
             outcomes.append(Outcome(int(arena.state.outcome[0, EGO])).word)
     finally:
@@ -252,13 +260,15 @@ def _check_independence(driver: Driver, played: Sequence[Sequence[Decision]], fi
     replayed = [list(each) for each in played]
     replayed[shortest] = [*played[shortest], *played[shortest]]
     reset_at = len(played[shortest])
-    checked = _CheckedDriver(driver, [])
+    seconds, rows_of_call = list[float](), list[int]()
+    checked = _CheckedDriver(driver, seconds)
     checked.reset(np.arange(len(replayed)))
     for step in range(max(map(len, replayed))):
         if step == reset_at:
             checked.reset(np.array([shortest]))
         games = np.array([game for game, each in enumerate(replayed) if step < len(each)])
         rows = [replayed[game][step] for game in games]
+        rows_of_call.append(len(rows))
         actions = checked.decide(games, np.array([r.observation for r in rows]), np.array([r.noise for r in rows]))
         difference = np.abs(actions - np.array([row.action for row in rows])).max(axis=1)
         if difference.max() > TOLERANCE:
@@ -269,4 +279,5 @@ def _check_independence(driver: Driver, played: Sequence[Sequence[Decision]], fi
                 "the state must be kept per game"
             )
             return
+    findings.seconds_at_once = float(np.median(np.array(seconds) / rows_of_call))
     findings.passed.append(f"{len(replayed)} games at once, one of them reset in between: the same actions as alone")

@@ -184,14 +184,15 @@ def check_driver(
 ) -> None:
     """Check that a driver conforms to the driver protocol, and list every violation.
 
-    Plays seeded games twice, then replays their observations with all games at once. Exit code 1: it does not conform.
+    Plays seeded games twice, then all at once, and tells how long a campaign takes. Exit code 1: it does not conform.
     """
     from rich.console import Console
 
     from harness.assessment.conformance import check_named
+    from harness.cli.driver_pace import pace_lines
 
     findings = check_named(driver, document_at(scene, "networks"), games, allow_code=allow_code)
-    print_plain(findings.lines(), Console())
+    print_plain([*findings.lines(), *pace_lines(findings, driver)], Console())
     if findings.violations:
         raise typer.Exit(NOT_CONFORMANT)
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from harness.assessment import conformance
-from harness.assessment.conformance import check_conformance, difference_of
+from harness.assessment.conformance import Findings, check_conformance, difference_of
 from harness.config.campaign import LEARNED, SUMO
 from harness.drivers.car import car_of
 from harness.drivers.sumo import SumoDriver
@@ -98,6 +98,23 @@ def test_check__a_conforming_driver_passes(merge: OpenScene) -> None:
     assert len(found.passed) == 3
     assert len(found.outcomes) == 2
     assert min(found.seconds) >= 0.0
+
+
+def test_time__the_longest_decision_is_judged_and_not_the_average() -> None:
+    (line,) = Findings(seconds=[0.01, 0.01, 0.25, 0.01], step_s=0.1).lines()[1:]
+    assert line.startswith(
+        "  time   250.00 ms per decision at most: slower than the scene's step of 0.1 s; 70.00 ms on"
+    )
+    assert line.endswith("on average, 14 decisions a second")
+    assert "faster" in Findings(seconds=[0.09, 0.01]).lines()[1]
+
+
+def test_check__times_each_game_and_the_decisions_of_all_games_at_once(merge: OpenScene) -> None:
+    found = check_conformance(Good(), merge, 2)
+    assert len(found.game_seconds) == 2
+    assert min(found.game_seconds) > 0.0
+    assert found.seconds_at_once is not None
+    assert 0.0 < found.seconds_at_once < 0.1
 
 
 @pytest.mark.parametrize(

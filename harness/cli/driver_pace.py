@@ -1,0 +1,31 @@
+"""How long a campaign takes with a driver, by the games that `harness check-driver` played."""
+
+from __future__ import annotations
+
+from harness.assessment.conformance import Findings
+from harness.campaign.plan.plan import plan
+from harness.campaign.plan.stages import AssessmentStage, SearchStage, TrainingStage
+from harness.config.campaign import Campaign, Ego
+from harness.reports.numbers import duration, steps_text
+
+
+def pace_lines(findings: Findings, written: str) -> list[str]:
+    """What an arm and a campaign with one person take in one process; nothing of a driver with violations."""
+    if not findings.game_seconds or findings.violations:
+        return []
+    game_s = sum(findings.game_seconds) / len(findings.game_seconds)
+    campaign = Campaign(name="pace", scene="merge", personas=["person"], ego=Ego(driver=written))
+    stages = plan(campaign, ["person"], findings.tunable)
+    games = campaign.assessment.episodes
+    arms = sum(isinstance(each, AssessmentStage) and bool(each.ego) for each in stages)
+    parts = [f"{arms} arms {duration(arms * games * game_s)}"]
+    for stage in stages:
+        if isinstance(stage, SearchStage):
+            searched = campaign.reconfiguration.trials * campaign.reconfiguration.games
+            parts.append(f"the search of {searched:,} games up to {duration(searched * game_s)}")
+        elif isinstance(stage, TrainingStage) and findings.seconds_at_once:
+            decisions = round(campaign.training.steps * (1.0 - stage.alone_share))
+            words = f"its {steps_text(decisions)} decisions in the person's training up to"
+            parts.append(f"{words} {duration(decisions * findings.seconds_at_once)}")
+    arm = f"  pace   {duration(games * game_s)} for an arm of {games} games in one process"
+    return [arm, f"         a campaign with one person: {'; '.join(parts)}"]

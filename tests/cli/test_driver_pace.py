@@ -1,0 +1,36 @@
+"""How long a campaign takes with a driver, by the time of its checked games."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from harness.assessment.conformance import Findings
+from harness.cli.driver_pace import pace_lines
+
+
+def lines(driver: str = "mine.toml", **found: Any) -> list[str]:
+    return pace_lines(Findings(**{"game_seconds": [2.0, 4.0], "seconds_at_once": 0.01, **found}), driver)
+
+
+def test_pace__of_an_arm_and_of_a_campaign_with_one_person() -> None:
+    """100 games of 3 s; the ego alone, with SUMO's driver and with the person; 30 % of 3 M steps beside it."""
+    assert lines() == [
+        "  pace   5 min 00 s for an arm of 100 games in one process",
+        "         a campaign with one person: 3 arms 15 min 00 s; its 900 k decisions in the person's training up to "
+        "2 h 30 min",
+    ]
+
+
+def test_pace__a_search_plays_games_too() -> None:
+    told = lines(tunable=True)[1]
+    assert "5 arms 25 min 00 s" in told
+    assert "the search of 2,560 games up to 2 h 08 min" in told
+
+
+def test_pace__sumos_own_models_make_no_decisions() -> None:
+    assert lines("sumo", seconds_at_once=None)[1] == "         a campaign with one person: 3 arms 15 min 00 s"
+
+
+def test_pace__is_not_told_of_a_driver_that_violates_the_protocol() -> None:
+    assert lines(violations=["it modified the observation"]) == []
+    assert lines(game_seconds=[]) == []
