@@ -24,6 +24,7 @@ import numpy as np
 from harness.config.campaign import LEARNED, SUMO
 from harness.drivers.car import car_of
 from harness.drivers.external import find_driver
+from harness.drivers.policy_origin import other_games
 from harness.drivers.protocol import Driver
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
@@ -160,6 +161,8 @@ def check_named(written: str, scene: Path, games: int, *, allow_code: bool) -> F
         driver, title = external.make(car_of(opened.world, EGO), sampled=False), external.in_words
     findings = check_conformance(driver, opened, games)
     findings.notes += external.notes if external is not None else ()
+    if external is not None and external.document is None:
+        findings.notes += filter(None, [other_games(external.place, opened.document, opened.world, player=EGO)])
     findings.tunable = external is not None and bool(external.searched)
     findings.title, findings.step_s = f"{title}, on {opened.document.name}", opened.world.step_s
     return findings

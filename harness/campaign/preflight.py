@@ -24,6 +24,7 @@ from harness.config.toml_reading import Document, read_document
 from harness.drivers.car import car_of
 from harness.drivers.driver_files import sha256_of
 from harness.drivers.external import ExternalDriver, find_driver
+from harness.drivers.policy_origin import grouped, other_games
 from harness.errors import Problem, UsageError, collect
 from harness.game.roles import EGO
 from harness.road.scene.load_check import check_loads
@@ -70,6 +71,8 @@ class OpenCampaign:
     """The external drivers of the cross-play, by name."""
     policy_drivers: Mapping[str, ExternalDriver]
     """The policies of others in the folder `policies`, by name."""
+    learned_elsewhere: dict[str, str]
+    """Policies that learned in other games than the campaign's: how the games differ, in words."""
     hashes: dict[str, str]
     """SHA-256 of every file that the campaign rests on, by its path from the campaign's folder."""
 
@@ -112,7 +115,9 @@ def open_campaign(
     persona_files: list[Path] = []
     found = [collect(problems, partial(_read_persona, file, key, name, persona_files)) for key, name in written]
     ego_persona, *personas = found
+    elsewhere: dict[str, str] = {}
     if ego_driver is not None and scene is not None:
+        collect(problems, partial(_note_origin, ego_driver, scene, ego_persona, elsewhere))
         sampled = ego_persona is not None and ego_persona.decisions == "sampled"
         collect(
             problems,
@@ -122,6 +127,9 @@ def open_campaign(
     if document is not None:
         problems += _ignored_tables(file, document, ego_driver)
         other_egos = _find_other_egos(file, document, scene, allow_code=allow_code, problems=problems)
+        if scene is not None:
+            for each in other_egos.values():
+                collect(problems, partial(_note_origin, each, scene, ego_persona, elsewhere))
     policies = collect(problems, lambda: find_policies(file, named.policies, policies_exist))
     problems += _same_names(file, named.personas, personas)
     if not problems and scene is not None:
@@ -140,8 +148,9 @@ def open_campaign(
             ego_persona=ego_persona,
             personas=read,
             folder=policies,
-            world=scene.world,
+            scene=scene,
             allow_code=allow_code,
+            elsewhere=elsewhere,
         )
     files = [file, *files, *persona_files, *(scene.folder / each for each in scene.document.files)]
     for external in (ego_driver, *other_egos.values()):
@@ -158,8 +167,17 @@ def open_campaign(
         policies=policies,
         other_egos=other_egos,
         policy_drivers=policy_drivers,
+        learned_elsewhere=dict(grouped(elsewhere)),
         hashes={_relative(file, each): sha256_of(each) for each in files},
     )
+
+
+def _note_origin(driver: ExternalDriver, scene: OpenScene, persona: Persona | None, elsewhere: dict[str, str]) -> None:
+    """Add to `elsewhere` how the games in which an ego's policy learned differ. Raises UsageError as `other_games`."""
+    if driver.document is None and (
+        words := other_games(driver.place, scene.document, scene.world, player=EGO, persona=persona)
+    ):
+        elsewhere[driver.written] = words
 
 
 def _is_tunable(driver: ExternalDriver | None) -> bool:

@@ -18,9 +18,10 @@ from harness.config.toml_reading import nearest
 from harness.drivers.car import Car, car_of
 from harness.drivers.external import ExternalDriver, find_driver
 from harness.drivers.policy_file import Policy, check_no_archive, persona_hash, policy_files, read_policy
+from harness.drivers.policy_origin import other_games
 from harness.errors import Problem, UsageError, collect
-from harness.game.roles import EGO, ROLES
-from harness.game.world import World
+from harness.game.roles import EGO, NON_EGO, ROLES
+from harness.road.scene.open_scene import OpenScene
 from harness.shipped_documents import find_document
 
 DRIVER = "driver.toml"
@@ -51,13 +52,14 @@ def check_policies(
     ego_persona: Persona,
     personas: Sequence[Persona],
     folder: Path,
-    world: World,
+    scene: OpenScene,
     allow_code: bool,
+    elsewhere: dict[str, str],
 ) -> tuple[list[Path], dict[str, ExternalDriver]]:
     """The files of every policy that a campaign reads, and the policies of others by the name of their folder.
 
     Raises UsageError for each that is missing or does not fit, and for each that runs code in files without permission
-    (`allow_code`).
+    (`allow_code`). How the games differ in which a policy learned is added to `elsewhere`, by its name.
     """
     available = {each.name for each in folder.iterdir() if each.is_dir()}
     by_name = {each.name: each for each in personas}
@@ -66,13 +68,14 @@ def check_policies(
     drivers: dict[str, ExternalDriver] = {}
     for name in dict.fromkeys(name for stage in plan(document, list(by_name)) for name in stage.reads):
         place = folder / name / DRIVER
+        person = by_name.get(name.rpartition("-seed")[0])
+        player = EGO if person is None else NON_EGO
         if name not in available:
             message = f"{document.policies!r} holds no policy {name!r}"
             problems.append(Problem(str(file), "policies", message, _alternatives(name, available)))
         elif place.is_file():
-            person = by_name.get(name.rpartition("-seed")[0])
             sampled = (person or ego_persona).decisions == "sampled"
-            car = car_of(world, EGO if person is None else EGO + 1)
+            car = car_of(scene.world, player)
             driver = collect(problems, partial(_find_and_try, place, allow_code, car, sampled))
             if driver is not None:
                 drivers[name] = driver
@@ -81,6 +84,9 @@ def check_policies(
             policy = collect(problems, partial(read_policy, folder / name))
             if policy is not None:
                 problems += _problems_of(policy, folder / name, ego_persona, by_name)
+                origin = partial(other_games, folder / name, scene.document, scene.world, player=player)
+                if words := collect(problems, origin):
+                    elsewhere[name] = words
             files += policy_files(folder / name)
     if problems:
         raise UsageError(problems)

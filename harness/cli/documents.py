@@ -120,7 +120,8 @@ def _check_campaign(file: Path, allow_code: bool, as_json: bool, console: Consol
     stages = plan(opened.document, [persona.name for persona in opened.personas], opened.tunable)
     notes = opened.ego_driver.notes if opened.ego_driver is not None else ()
     ego = [] if opened.document.ego.driver == LEARNED else [messages.ego(opened), *notes]
-    ego = [plain(each) for each in (*ego, *(f"{driver}: {told}" for driver, told in varying.items()))]
+    told = (*varying.items(), *opened.learned_elsewhere.items())
+    ego = [plain(each) for each in (*ego, *(f"{driver}: {words}" for driver, words in told))]
     unsuited = persona_remarks(opened.personas, opened.scene.world, opened.document.training.discount)
     remarks = [*opened.scene.warnings, *unsuited, *ego]
     print_plain([f"{file} is in order.", *remarks], console)

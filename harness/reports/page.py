@@ -103,7 +103,7 @@ def _header(tables: RunTables) -> dict[str, Any]:
 
 
 def _troubles(tables: RunTables) -> dict[str, Any]:
-    """The banners: unfinished stages, mixed versions, games that could not be played."""
+    """The banners: what is unfinished, what could not be played, and what makes the numbers mean less."""
     errored = tables.episodes[unplayed(tables.episodes)]
     return {
         "unfinished": tables.unfinished,
@@ -114,6 +114,7 @@ def _troubles(tables: RunTables) -> dict[str, Any]:
         "errored": errored.groupby(["arm", "seed"], sort=False).size().items(),
         "errors": len(errored),
         "varying": list(tables.manifest.get("varying_drivers", {}).items()),
+        "learned_elsewhere": list(tables.manifest.get("learned_elsewhere", {}).items()),
         "error_reasons": reasons_of(errored["error"]),
         "ego_games": int(tables.episodes["ego_failed"].notna().sum()),
     }

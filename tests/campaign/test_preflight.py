@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from harness.campaign.preflight import QUICK_RESPONSE_STEPS, QUICK_SEGMENT_STEPS, QUICK_STEPS, open_campaign
-from harness.drivers.policy_file import write_policy
+from harness.drivers.policy_file import Policy, write_policy
 from harness.errors import Problem, UsageError
 from tests.support.policies import some_policy
 from tests.support.tiny import CAREFUL, MERGE, write_campaign, write_persona
@@ -113,3 +113,25 @@ def test_open_campaign__the_folder_of_a_policy(tmp_path: Path) -> None:
     (tmp_path / "policies" / "mine" / "policy.safetensors").write_bytes(b"PK")
     (problem,) = problems_of(file)
     assert Path(problem.file).name == "policy.safetensors"
+
+
+def test_open_campaign__tells_of_egos_that_learned_in_other_games(tmp_path: Path) -> None:
+    card = {"player": "ego", "persona": "hasty", "persona_sha256": "0" * 64, "scene": "merge"}
+    for name, scene in (("mine", "merge"), ("other", "crossing")):
+        write_policy(Policy(some_policy().tensors, {**card, "scene": scene}), tmp_path / name)
+    campaign = write_campaign(
+        tmp_path, ego={"driver": "mine", "persona": str(CAREFUL)}, crossplay={"egos": ["other"]}, training=None
+    )
+    persona = "persona hasty, here careful"
+    assert open_campaign(campaign).learned_elsewhere == {
+        "mine": f"learned in other games: {persona}",
+        "other": f"learned in other games: scene crossing, here merge; {persona}",
+    }
+
+
+def test_open_campaign__refuses_an_ego_that_learned_with_another_car(tmp_path: Path) -> None:
+    cars = [{"max_acceleration_mps2": 3.0, "max_braking_mps2": 6.0, "max_steering_rad": 0.6}]
+    write_policy(Policy(some_policy().tensors, {"cars": cars}), tmp_path / "mine")
+    (problem,) = problems_of(write_campaign(tmp_path, ego={"driver": "mine", "persona": str(CAREFUL)}, training=None))
+    assert (Path(problem.file).name, problem.key) == ("policy.json", "cars")
+    assert "max_braking_mps2 6 m/s², max_steering_rad 0.6 rad, and the ego of scene merge has" in problem.message

@@ -11,7 +11,7 @@ import pytest
 from harness.campaign.preflight import open_campaign
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
-from harness.drivers.policy_file import Policy, persona_hash, write_policy
+from harness.drivers.policy_file import Policy, persona_hash, read_policy, write_policy
 from harness.errors import UsageError
 from tests.support.policies import some_policy
 from tests.support.tiny import CAREFUL, write_campaign, write_persona
@@ -69,3 +69,14 @@ def test_persona_hash__leaves_out_what_nothing_is_learned_by(anna: Path) -> None
     described = persona.model_copy(update={"name": "bert", "description": "the same driver by another name"})
     assert persona_hash(described) == persona_hash(persona)
     assert persona_hash(persona.model_copy(update={"decisions": "sampled"})) != persona_hash(persona)
+
+
+def test_policies__that_learned_in_other_games_are_told_in_one_line(tmp_path: Path, anna: Path) -> None:
+    campaign = campaign_with_policies(tmp_path, anna)
+    assert open_campaign(campaign).learned_elsewhere == {}
+    for folder in (tmp_path / "policies").iterdir():
+        policy = read_policy(folder)
+        write_policy(Policy(policy.tensors, {**policy.card, "scene": "crossing", "step_s": 0.2}), folder)
+    ((names, words),) = open_campaign(campaign).learned_elsewhere.items()
+    assert sorted(names.split(", ")) == ["anna-seed1", "naive-seed1", "retrained_anna-seed1"]
+    assert words == "learned in other games: scene crossing, here merge; step_s 0.2, here 0.1"

@@ -263,6 +263,14 @@ def test_banner__stages_and_games_that_failed_are_named_with_their_message(page)
     assert "could not be played." not in page.text.split("Figures")[0]
 
 
+def test_banner__policies_that_learned_in_other_games_are_named(page):
+    arguments = campaign(personas=["speedy"])
+    arguments["manifest"]["learned_elsewhere"] = {"mine/<policy>": "learned in other games: scene crossing, here merge"}
+    told = "mine/<policy>: learned in other games: scene crossing, here merge"
+    assert told in text_of(arguments)
+    assert "learned in other games" not in page.text
+
+
 def test_next_steps__a_person_that_did_not_learn_may_imitate_a_driver(page):
     sentence, line = "speedy did not learn to drive here.", "imitation = true"
     told = text_of(cannot_drive(campaign(personas=["speedy"]))).split("What to do next")[1]

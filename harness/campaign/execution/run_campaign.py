@@ -48,7 +48,7 @@ def run_campaign(
     with folder.held():
         with console.status(REPEATING):
             varying = varying_drivers(campaign, folder)
-        for driver, difference in varying.items():
+        for driver, difference in (*varying.items(), *campaign.learned_elsewhere.items()):
             console.print(plain(f"{driver}: {difference}"), style="bold yellow", highlight=False, markup=False)
         stages = plan(campaign.document, [persona.name for persona in campaign.personas], campaign.tunable)
         keys = stage_keys(campaign, stages)
@@ -133,6 +133,8 @@ class _ManifestKeeper:
         }
         if varying:
             self.content["varying_drivers"] = dict(varying)
+        if campaign.learned_elsewhere:
+            self.content["learned_elsewhere"] = campaign.learned_elsewhere
         self._write()
 
     def note(self, event: Event) -> None:

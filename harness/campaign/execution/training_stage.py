@@ -14,6 +14,7 @@ from harness.campaign.plan.stages import SumoDriven, TrainingStage, description,
 from harness.campaign.plan.strategy_stages import training_settings
 from harness.campaign.storage.versions import versions_since
 from harness.drivers.policy_file import persona_hash, policy_files, read_policy, write_policy
+from harness.drivers.policy_origin import origin_card
 from harness.errors import StageFailed
 from harness.evaluation.tables import table_of, write_csv
 from harness.files import make_folder
@@ -95,7 +96,7 @@ def _policy_card(stage: TrainingStage, spec: TrainingSpec) -> dict[str, Any]:
         "player": ROLES[stage.learner],
         "persona": spec.persona.name,
         "persona_sha256": persona_hash(spec.persona),
-        "scene": spec.scene.document.name,
+        **origin_card(spec.scene.document, spec.scene.world, stage.learner),
         "people": len(spec.scene.document.non_ego),
         "against": " and ".join(map(description, stage.opponent)) or None,
         "began_from": stage.initial.stage if stage.initial is not None else None,

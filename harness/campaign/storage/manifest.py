@@ -77,6 +77,10 @@ class Manifest(_Record):
     stages: dict[Text, StageEntry]
     ego_persona: Persona
     persona_documents: dict[Name, Persona]
+    varying_drivers: dict[Text, Text] = Field({})
+    """Drivers that decide otherwise when a game is played again, with the difference in words."""
+    learned_elsewhere: dict[Text, Text] = Field({})
+    """Policies that learned in other games than those of the campaign, with the difference in words."""
 
     @model_validator(mode="after")
     def _is_consistent(self) -> Manifest:
