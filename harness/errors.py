@@ -13,6 +13,7 @@ from __future__ import annotations
 import resource
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from errno import EDQUOT, EFBIG, EIO, ENOSPC, EROFS
 from typing import TypeVar
 
 T = TypeVar("T")
@@ -121,6 +122,17 @@ def limited_memory() -> str:
     if limit_bytes == resource.RLIM_INFINITY:
         return ""
     return f"each process may use {limit_bytes / 1e9:.1f} GB of address space: raise this limit, ulimit -v"
+
+
+def is_of_disk(error: BaseException) -> bool:
+    """Whether an error means that the disk takes no more."""
+    return isinstance(error, OSError) and error.errno in (ENOSPC, EDQUOT, EFBIG, EIO, EROFS)
+
+
+def of_system(error: OSError) -> str:
+    """The file of an error of the operating system, if it names one, and the reason."""
+    reason = error.strerror or str(error)
+    return f"{error.filename}: {reason}" if error.filename else reason
 
 
 def collect(problems: list[Problem], action: Callable[[], T]) -> T | None:

@@ -11,7 +11,8 @@ import hashlib
 import os
 import stat
 import tempfile
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
@@ -22,14 +23,25 @@ _BLOCK_BYTES = 1_000_000
 
 def write_atomically(path: Path, content: bytes) -> None:
     """Write a file through a temporary one beside it. If this raises OSError, an existing file is unchanged."""
-    handle, scratch = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=_SCRATCH)
+    with errors_naming(path):
+        handle, scratch = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=_SCRATCH)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(content)
+            os.chmod(scratch, 0o644)
+            replace_durably(Path(scratch), path)
+        except BaseException:
+            Path(scratch).unlink(missing_ok=True)
+            raise
+
+
+@contextmanager
+def errors_naming(path: Path) -> Iterator[None]:
+    """An OSError of the block names this file: that of a full disk names none."""
     try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        os.chmod(scratch, 0o644)
-        replace_durably(Path(scratch), path)
-    except BaseException:
-        Path(scratch).unlink(missing_ok=True)
+        yield
+    except OSError as error:
+        error.filename, error.filename2 = str(path), None
         raise
 
 

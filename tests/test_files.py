@@ -29,8 +29,9 @@ def test_write_atomically__a_failure_leaves_only_the_old_file(tmp_path: Path, mo
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", disk_full)
-    with pytest.raises(OSError, match="No space left"):
+    with pytest.raises(OSError, match="No space left") as error:
         write_atomically(file, b"new")
+    assert error.value.filename == str(file)
     assert file.read_bytes() == b"old"
     assert [each.name for each in tmp_path.iterdir()] == ["table.csv"]
 

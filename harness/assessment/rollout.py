@@ -20,6 +20,7 @@ from harness.drivers.mixture import Mixture, factors_of, shares_of
 from harness.environments.arena import Arena, Step
 from harness.environments.recorded import recorded_game
 from harness.environments.seats import seats_of
+from harness.errors import is_of_disk
 from harness.evaluation.measured_game import measured
 from harness.evaluation.recorded_game import RecordedGame
 from harness.evaluation.trace_file import SCHEMA
@@ -86,7 +87,7 @@ def assess(
 
     `on_start` gets each episode number before that game is played. Episodes in `abandoned` are not played; their record
     has the reason as its error. `start_from` may change the start that is drawn for a game.
-    Raises SimulationError if SUMO can't load the scene.
+    Raises SimulationError if SUMO can't load the scene, MemoryError, and OSError if the disk takes no more.
     """
     factors, shares = [factors_of(each) for each in arm.drivers], [shares_of(each) for each in arm.drivers]
     start_distribution = arm.scene.start_distribution(factors, [1.0] * len(factors), shares)
@@ -99,9 +100,9 @@ def assess(
             on_start(episode)
             try:
                 yield _play(arena, arm, start_distribution, episode, start_from)
-            except MemoryError:
-                raise
             except Exception as error:  # a driver may raise any exception: the other games are played
+                if isinstance(error, MemoryError) or is_of_disk(error):
+                    raise
                 yield _failed(arm, episode, f"{type(error).__name__}: {error}")
     finally:
         arena.close()

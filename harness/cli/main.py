@@ -31,7 +31,16 @@ from harness.cli.output import (
 from harness.cli.pinning import minimise, regression
 from harness.cli.runs import compare, export, replay, serve
 from harness.cli.scenes import scene_app
-from harness.errors import FAILED, NOT_ACCEPTED, USAGE_ERROR, HarnessError, UsageError, is_of_memory, short_of_memory
+from harness.errors import (
+    FAILED,
+    NOT_ACCEPTED,
+    USAGE_ERROR,
+    HarnessError,
+    UsageError,
+    is_of_memory,
+    of_system,
+    short_of_memory,
+)
 from harness.shipped_documents import document_at
 
 if TYPE_CHECKING:
@@ -225,7 +234,9 @@ def _end_with(outcome: RunResult, run: Path, console: Console, as_json: bool = F
         print_plain(did_not_learn, console)
         print_plain((bound.text for bound in outcome.acceptance if not bound.passed), console)
     if outcome.failed_stages:
-        print_plain([f"Not finished: {', '.join(outcome.failed_stages)}"], console, "red")
+        reasons = dict.fromkeys(filter(None, outcome.failed_stages.values()))
+        stages = f"Not finished: {', '.join(outcome.failed_stages)}"
+        print_plain([stages, *(f"  {reason}" for reason in reasons)], console, "red")
     if outcome.error_games:
         count = f"{outcome.error_games} games could not be played; their pairs are left out"
         print_plain([count, *(f"  {each}" for each in outcome.error_reasons)], console, "red")
@@ -276,7 +287,7 @@ def main() -> None:
             _fail(f"{short_of_memory(error)}; finished work is kept", FAILED)
         if not isinstance(error, OSError) or error.errno not in MACHINE_ERRORS:
             raise
-        _fail(f"{error.filename or 'the run folder'}: {error.strerror}; finished work is kept", FAILED)
+        _fail(f"{of_system(error)}; finished work is kept", FAILED)
 
 
 if __name__ == "__main__":

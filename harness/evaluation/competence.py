@@ -155,7 +155,8 @@ def gate(bounds: Iterable[AloneBound], seed: int, games: Mapping[Any, pd.DataFra
     for bound in bounds:
         if bound.goal_share == 0:
             continue
-        goals = goals_alone(games.get((bound.arm, seed)), bound.player)
+        played = games.get((bound.arm, seed))
+        goals = goals_alone(played, bound.player)
         if goals.suffice(bound.goal_share):
             continue
         if goals.played:
@@ -163,7 +164,12 @@ def gate(bounds: Iterable[AloneBound], seed: int, games: Mapping[Any, pd.DataFra
             clauses.append(f"{bound.words} can't drive this scene: {goals.below(bound.goal_share)}")
         else:
             unknown = f"so it is not known how {bound.words} drives"
-            clauses.append(f"no game of the arm {bound.arm} could be played, {unknown}")
+            why = (
+                f"the arm {bound.arm} is not finished"
+                if played is None
+                else f"no game of the arm {bound.arm} could be played"
+            )
+            clauses.append(f"{why}, {unknown}")
     if not clauses:
         return {"verdict": "", "reason": ""}
     verdict = {

@@ -25,7 +25,7 @@ import pyarrow.parquet as pq
 from harness.errors import UsageError
 from harness.evaluation.column import COUNT, FLAG, NUMBER, TEXT
 from harness.evaluation.trace_columns import TRACE_COLUMNS
-from harness.files import check_file, replace_durably, scratch_beside
+from harness.files import check_file, errors_naming, replace_durably, scratch_beside
 from harness.game.arrays import FloatArray
 
 _MOST_BYTES = 10**12
@@ -137,11 +137,12 @@ def _segments_of(path: Path) -> list[_Segment]:
 def _write(groups: Iterable[pa.Table], path: Path, schema: pa.Schema = SCHEMA) -> None:
     scratch = scratch_beside(path)
     try:
-        with pq.ParquetWriter(scratch, schema, compression="zstd") as writer:
-            for group in groups:
-                if group.num_rows:
-                    writer.write_table(group.replace_schema_metadata(schema.metadata))
-        replace_durably(scratch, path)
+        with errors_naming(path):
+            with pq.ParquetWriter(scratch, schema, compression="zstd") as writer:
+                for group in groups:
+                    if group.num_rows:
+                        writer.write_table(group.replace_schema_metadata(schema.metadata))
+            replace_durably(scratch, path)
     finally:
         scratch.unlink(missing_ok=True)
 

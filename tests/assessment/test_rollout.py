@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from errno import ENOSPC
 from typing import Any
 
 import numpy as np
@@ -143,6 +144,11 @@ def test_assess__an_exception_of_a_driver_ends_only_its_game(error: Exception, m
         assert set(game.record) == {"episode", "ego_outcome", "non_ego_outcome", "error"}
     assert [game.record["episode"] for game in games] == [0, 1, 2, 3]
     assert records(games[::2]) == records(without_errors[::2])
+
+
+def test_assess__a_full_disk_is_raised_and_is_no_game_in_error(merge: OpenScene) -> None:
+    with pytest.raises(OSError, match="No space left"):
+        play(arm(merge, Failing(OSError(ENOSPC, "No space left on device")), SumoDriver()), 2)
 
 
 def test_assess__an_interrupt_is_raised(merge: OpenScene) -> None:

@@ -76,7 +76,7 @@ def run_by(work: Work, folder: Path) -> tuple[RunResult, str]:
 
 def test_sigsegv__of_a_game_is_one_error_and_of_a_segment_none(tmp_path: Path) -> None:
     outcome, said = run_by(die_in_game_1, tmp_path)
-    assert (outcome.error_games, outcome.failed_stages) == (1, ())  # for which the command's exit code is 1
+    assert (outcome.error_games, outcome.failed_stages) == (1, {})  # for which the command's exit code is 1
     assert (
         f"naive_vs_sumo-seed1: the worker died of SIGSEGV, {MOST_CRASHES} times in game 1, which is abandoned" in said
     )
@@ -134,6 +134,7 @@ def test_disk__that_takes_no_more_is_one_message(tmp_path: Path) -> None:
         limit = limited(resource.RLIMIT_FSIZE, most_bytes)
         full = harness("campaign", campaign, "--out", run, "--jobs", 1, preexec_fn=limit)
         assert_one_message(full, "File too large")
+        assert str(run) in full.stderr  # the file that could not be written
         assert not list(run.rglob(".*.part"))
     carried_out(campaign, run)
     assert tables(run) == tables(untrained_run())

@@ -123,7 +123,9 @@ def test_gate__players_that_were_not_played_alone_are_not_taken_on_trust() -> No
     assert gate(RQ1.alone, 1, games) == {"verdict": "", "reason": ""}
     closed = gate(RQ1.alone, 2, games)
     assert closed["verdict"] == Verdict.NOT_PLAYED_ALONE.value
-    assert "no game of the arm speedy_alone could be played" in closed["reason"]
+    assert "the arm speedy_alone is not finished" in closed["reason"]
+    unplayed = episodes.assign(error=episodes["error"].where(episodes["arm"] != "speedy_alone", "SUMO died"))
+    assert "no game of the arm speedy_alone could be played" in gate(RQ1.alone, 1, games_by_arm(unplayed))["reason"]
 
 
 def test_gate__a_bound_of_0_asks_nothing() -> None:

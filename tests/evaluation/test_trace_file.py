@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from errno import ENOSPC
 from pathlib import Path
 from typing import Any
 
@@ -97,3 +98,14 @@ def test_trace_writer__a_column_that_is_missing_is_an_error(tmp_path: Path) -> N
     with pytest.raises(KeyError):
         write(tmp_path / "t.parquet", incomplete)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_trace_writer__a_full_disk_names_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def disk_full(*_: object) -> None:
+        raise OSError(ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(pq.ParquetWriter, "write_table", disk_full)
+    with pytest.raises(OSError, match="No space left") as error:
+        write(tmp_path / "t.parquet", game(0))
+    assert error.value.filename == str(tmp_path / "t.parquet")
+    assert not list(tmp_path.iterdir())

@@ -26,7 +26,7 @@ from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign
 from harness.config.persona import Persona
 from harness.drivers.external import ExternalDriver
-from harness.errors import HarnessError, is_of_memory, short_of_memory
+from harness.errors import HarnessError, is_of_memory, of_system, short_of_memory
 from harness.files import make_folder
 
 OnProgress: TypeAlias = Callable[[int, int], None]
@@ -165,7 +165,8 @@ def carry_out_in_worker(stage: Stage, attempt: Attempt, *, context: RunContext, 
         with held_by_worker(context.folder.workers, stage.id, _LOST_S), preparations_reported(on_preparation):
             return Event(kind="done", stage=stage.id, info=work(stage, run))
     except (HarnessError, OSError) as error:
-        return Event(kind="failed", stage=stage.id, message=str(error))
+        message = of_system(error) if isinstance(error, OSError) else str(error)
+        return Event(kind="failed", stage=stage.id, message=message)
     except Exception as error:
         # the message of a bug is its traceback
         message = short_of_memory(error) if is_of_memory(error) else traceback.format_exc()

@@ -62,7 +62,8 @@ class RunResult(Document):
 
     verdicts: tuple[ShownVerdict, ...]
     """One for each persona and question."""
-    failed_stages: tuple[Line, ...]
+    failed_stages: Mapping[Line, Line]
+    """Those that are not finished, each with the reason; empty where there is none yet."""
     error_games: int = Field(ge=0)
     error_reasons: tuple[Line, ...] = ()
     """Why games could not be played, the most frequent reason first."""

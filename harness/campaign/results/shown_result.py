@@ -26,7 +26,11 @@ def shown_result(campaign: Campaign, tables: RunTables) -> RunResult:
         verdicts += [_shown(persona, verdict) for persona, verdict in gap_verdicts(tables.game.gaps)]
     return RunResult(
         verdicts=tuple(verdicts),
-        failed_stages=tuple(name for name, entry in tables.stages.items() if entry["status"] not in FINISHED),
+        failed_stages={
+            name: plain((entry.get("message") or "").strip().rpartition("\n")[2][:1000])
+            for name, entry in tables.stages.items()
+            if entry["status"] not in FINISHED
+        },
         error_games=int((tables.episodes["error"] != "").sum()),
         error_reasons=tuple(map(plain, reasons_of(tables.episodes["error"]))),
         did_not_learn=tuple(f"{name}: {shortfall}" for name, shortfall in did_not_learn(tables.stages).items()),
