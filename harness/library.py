@@ -48,14 +48,14 @@ class Results:
         """A table of the run, by the name of its CSV file: `table("manoeuvres")`.
 
         `harness columns` describes the columns; their names end with their units. Raises UsageError, which lists the
-        tables of the run, if it has no such table.
+        tables of the run, if it has no such table, and for one that was changed.
         """
         from harness.evaluation.tables import read_csv
 
         tables = sorted(each.stem for each in self.path.glob("*.csv"))
         if name not in tables:
             raise UsageError.of(self.path, f"table {name!r}", "is none of this run", f"tables: {', '.join(tables)}")
-        return read_csv(self.path / f"{name}.csv")
+        return read_csv(RunFolder(self.path).result(f"{name}.csv"))
 
     def trace(self, arm: str, seed: int, episode: int) -> pd.DataFrame:
         """The recording of a game: a row for each road user in each step, with its pose, speed and outcome.
@@ -88,7 +88,7 @@ class Results:
     def outcome(self) -> Mapping[str, Any]:
         """The content of `result.json`. Raises UsageError if it can't be read."""
         try:
-            return dict(json.loads(content_of(self.path / _RESULT, _MOST_BYTES)))
+            return dict(json.loads(content_of(RunFolder(self.path).result(_RESULT), _MOST_BYTES)))
         except (OSError, ValueError, TypeError) as error:
             remedy = f"write it anew: harness report {self.path}"
             raise UsageError.of(self.path / _RESULT, "", f"can't be read: {error}", remedy) from None

@@ -74,6 +74,14 @@ def print_plain(lines: Iterable[str], console: Console, style: str | None = None
         console.print(line, style=style, highlight=False, markup=False, soft_wrap=True)
 
 
+def say_unchecked(run: Path, console: Console) -> None:
+    """Say that a run folder has no checksums, if it has none."""
+    from harness.campaign.storage.run_folder import RunFolder
+
+    if RunFolder(run).is_published:
+        print_plain([f"{run}: has no checksums, as published; whether its files were changed is not known"], console)
+
+
 def print_version(wanted: bool) -> None:
     """Print the version of the package and end the command."""
     if wanted:

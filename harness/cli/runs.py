@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from harness.cli import messages
-from harness.cli.output import AsJson, RunPath, output, print_json, print_plain
+from harness.cli.output import AsJson, RunPath, output, print_json, print_plain, say_unchecked
 from harness.errors import UsageError
 
 _STYLES = {"harm": "red", "mended": "green", "open": "default"}
@@ -49,6 +49,7 @@ def replay(
             )
         if as_json and not listing:
             raise UsageError.of("--json", "", "lists games", "leave out the episode, or add --list")
+        say_unchecked(run, console)
         if arm is None or episode is None or list_games:
             chosen = GameList(arm=arm, outcome=outcome, seed=seed, rows=rows, page=page)
             if as_json:
@@ -142,7 +143,7 @@ def serve(
     with console.status(messages.reading(run)):
         report = ServedReport(RunFolder(run))
     try:
-        server = server_of(report, port)
+        server = server_of(report.answer, port)
     except OSError as error:
         reason = error.strerror or str(error)
         raise UsageError.of("--port", str(port), f"can't be opened: {reason}", "another port, or 0") from error
@@ -169,6 +170,8 @@ def compare(
 
     console, page = Console(), out or after / "compare.html"
     rows = compare_runs(before, after, page)
+    for run in (before, after):
+        say_unchecked(run, console)
     for row in rows:
         print_plain([row.sentence], console, _STYLES[row.tone])
     print_plain([headline(rows), f"Comparison: {page}"], console)

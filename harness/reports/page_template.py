@@ -16,6 +16,8 @@ from harness.reports.numbers import duration, number, p_number, percent, short
 
 CONTENT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data: blob:"
 """What the page may load: nothing but itself."""
+SERVED_POLICY = f"{CONTENT_POLICY}; connect-src 'self'"
+"""That of the page that `harness serve` sends: it may fetch from there as well."""
 ELSEWHERE = '<script type="application/json" id="elsewhere">{}</script>'
 """The list of the games that the page may fetch: empty in the file; `harness serve` fills it."""
 SCRIPTS = tuple(
@@ -62,7 +64,7 @@ def served_page(page: str, games: Sequence[Sequence[Any]], run: str) -> str:
     empty = ELSEWHERE.format("[]")
     if CONTENT_POLICY not in page or empty not in page:
         raise UsageError.of("report.html", run, "is not a report of this harness", f"harness report {run}")
-    page = page.replace(CONTENT_POLICY, f"{CONTENT_POLICY}; connect-src 'self'", 1)
+    page = page.replace(CONTENT_POLICY, SERVED_POLICY, 1)
     return page.replace(empty, ELSEWHERE.format(json_text(games)), 1)
 
 

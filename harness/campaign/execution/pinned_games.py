@@ -66,8 +66,8 @@ class PinnedGames:
 
     def __init__(self, folder: RunFolder, players: RunPlayers, out: Path) -> None:
         self._players, self._out = players, out
-        self._episodes = read_csv(folder.path / "episodes.csv")
-        self._causes = causes_in_words(read_csv(folder.path / "causes.csv"))
+        self._episodes = read_csv(folder.result("episodes.csv"))
+        self._causes = causes_in_words(read_csv(folder.result("causes.csv")))
 
     def failures(self, arm: str | None = None) -> list[RunFailure]:
         """One failure for each kind of failure of each arm (of one arm, if named) and seed.
@@ -77,8 +77,8 @@ class PinnedGames:
         """
         known = {(each.name, each.seed) for each in self._players.arms()}
         failed = self._failed()
-        failed = failed[[(game.arm, game.seed) in known and arm in (None, game.arm) for game in failed.itertuples()]]
-        failed = worst_first(failed)
+        named = [(game.arm, game.seed) in known and arm in (None, game.arm) for game in failed.itertuples()]
+        failed = worst_first(failed.loc[failed.index[named]])
         causes = [self._causes.get((game.arm, game.seed, game.episode), "") for game in failed.itertuples()]
         kinds = failed.assign(cause=causes).groupby(["arm", "seed", "ego_outcome", "cause"], sort=False)["episode"]
         return [

@@ -17,11 +17,12 @@ from harness.reports.comparison_page import ComparedRow, compared_rows, render_c
 
 def compare_runs(before: Path, after: Path, page: Path) -> list[ComparedRow]:
     """Compare the games of two run folders and write the page. Raises UsageError for a folder that is no run, one
-    without games, and a page that can't be written."""
+    without games, results that were changed, and a page that can't be written."""
     if not page.absolute().parent.is_dir():
         raise UsageError.of(page, "", f"there is no folder {page.parent}", "create it, or name another file with --out")
-    manifests = [RunFolder(run).manifest() for run in (before, after)]
-    games = [read_csv(run / "episodes.csv") for run in (before, after)]
+    folders = [RunFolder(run) for run in (before, after)]
+    manifests = [folder.manifest() for folder in folders]
+    games = [read_csv(folder.result("episodes.csv")) for folder in folders]
     scenes = [_scene(manifest) for manifest in manifests]
     same_scene = bool(scenes[0]) and scenes[0] == scenes[1]
     significance = manifests[1]["campaign"]["assessment"]["significance"]

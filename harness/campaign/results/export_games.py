@@ -40,11 +40,10 @@ def export_failures(
     if failures.empty:
         remedy = "export a game: harness export RUN ARM EPISODE DIR"
         raise UsageError.of(run, arm or "", "has no failures", remedy)
-    traces = [traces_of(source, row.arm, row.seed, row.episode) for row in failures.itertuples()]
+    arms = failures.drop_duplicates(["arm", "seed"]).itertuples()
+    traces = {(row.arm, row.seed): traces_of(source, row.arm, row.seed, row.episode) for row in arms}
     scene, reader = open_scene(source.scene), TraceReader()
-    games = (
-        _exported(read_game(row, file, reader, scene)) for row, file in zip(failures.itertuples(), traces, strict=True)
-    )
+    games = (_exported(read_game(row, traces[row.arm, row.seed], reader, scene)) for row in failures.itertuples())
     with progress_bar("exporting", console) as on_progress:
         return write_games(
             games,

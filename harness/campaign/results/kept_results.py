@@ -1,7 +1,8 @@
 """What the results of a run were made from, and their checksums: the same results are not made again.
 
 <run>/.stages/results.json holds a key of everything that results depend on (the manifest, the checksums of the stages'
-files, this program and its libraries), the verdicts for the terminal, and the checksums of every file of the results.
+files, this program and its libraries), the verdicts for the terminal, and the checksums of the manifest and of every
+file of the results, which `RunFolder.result` compares before it is read.
 It is written last. Where an input has changed, or a file is missing or damaged, the results are made anew: a record of
 earlier results fits neither inputs that have changed nor results that are half made.
 """
@@ -17,7 +18,7 @@ from typing import Annotated, Any
 from pydantic import Field, ValidationError
 
 from harness.campaign.storage.checksums import checksums_of, digest_of, intact_record
-from harness.campaign.storage.run_folder import RunFolder
+from harness.campaign.storage.run_folder import MANIFEST, RunFolder
 from harness.campaign.storage.versions import digest_of_sources
 from harness.config.toml_reading import Document
 from harness.errors import FAILED, NOT_ACCEPTED
@@ -89,7 +90,7 @@ class RunResult(Document):
 
 def kept_result(folder: RunFolder, manifest: Mapping[str, Any]) -> RunResult | None:
     """The result of a run whose results are all there, as this program would make them; None if they are not."""
-    record = intact_record(_file(folder), folder.path, key=_key(folder, manifest))
+    record = intact_record(folder.results, folder.path, key=_key(folder, manifest))
     names = {file.relative_to(folder.path).as_posix() for file in _results(folder)}
     if record is None or set(record.get("files", ())) != names:
         return None
@@ -103,15 +104,11 @@ def keep_result(folder: RunFolder, manifest: Mapping[str, Any], result: RunResul
     """Write down that the results in the folder are those of this manifest."""
     record = {"key": _key(folder, manifest), "result": result.model_dump(mode="json")}
     record["files"] = checksums_of(folder.path, _results(folder))
-    write_atomically(_file(folder), (json.dumps(record, indent=1) + "\n").encode())
-
-
-def _file(folder: RunFolder) -> Path:
-    return folder.path / ".stages" / "results.json"
+    write_atomically(folder.results, (json.dumps(record, indent=1) + "\n").encode())
 
 
 def _results(folder: RunFolder) -> Iterator[Path]:
-    yield from (folder.path / name for name in ("report.html", "result.json", "junit.xml"))
+    yield from (folder.path / name for name in (MANIFEST, "report.html", "result.json", "junit.xml"))
     yield from sorted(folder.path.glob("*.csv"))
     yield from sorted((folder.path / "policies").glob("*/README.md"))
     yield from (file for file in sorted(folder.replays.rglob("*")) if file.is_file())

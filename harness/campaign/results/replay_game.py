@@ -16,6 +16,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from harness.campaign.plan.stages import stage_id
 from harness.campaign.results.shown_work import progress_bar
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.toml_reading import nearest
@@ -52,7 +53,7 @@ def _listed(run: Path, chosen: GameList) -> tuple[pd.DataFrame, int, int]:
     all pages, and of pages. Raises UsageError where no game is of an arm, a seed or an outcome."""
     folder = RunFolder(run)
     ordered = worst_first(_chosen(run, episodes_of(folder), chosen))
-    causes = causes_in_words(read_csv(folder.path / "causes.csv"))
+    causes = causes_in_words(read_csv(folder.result("causes.csv")))
     rows = chosen.rows or max(len(ordered), 1)
     games = ordered.iloc[(chosen.page - 1) * rows : chosen.page * rows]
     outcomes = [f"{name}_outcome" for name in ("ego", *people_in(games.columns))]
@@ -185,7 +186,8 @@ def read_trace(traces: Path, episode: int, reader: TraceReader) -> pd.DataFrame:
 
 
 def traces_of(folder: RunFolder, arm: str, seed: int, episode: int) -> Path:
-    """The traces file of an arm and seed. Raises UsageError, which names the episode, if the folder lacks it."""
+    """The traces file of an arm and seed. Raises UsageError if the folder lacks it, which names the episode, and if it
+    is not what the campaign wrote."""
     traces = folder.traces_of_arm(arm, seed)
     if not traces.is_file():
         raise UsageError.of(
@@ -194,6 +196,7 @@ def traces_of(folder: RunFolder, arm: str, seed: int, episode: int) -> Path:
             "was recorded, but this folder does not contain the traces",
             f"watch it in {folder.path / 'report.html'}, or run campaign {folder.manifest()['name']!r} again",
         )
+    folder.check_games(stage_id(arm, seed))
     return traces
 
 
@@ -232,9 +235,9 @@ def film(game: PlayedGame, file: Path, console: Console) -> None:
 
 
 def episodes_of(folder: RunFolder) -> pd.DataFrame:
-    """The rows of `episodes.csv`. Raises UsageError unless the folder is one of a run."""
+    """The rows of `episodes.csv`. Raises UsageError unless the folder is one of a run, with the results it wrote."""
     folder.manifest()
-    return read_csv(folder.path / "episodes.csv")
+    return read_csv(folder.result("episodes.csv"))
 
 
 def games_of(run: Path, episodes: pd.DataFrame, arm: str | None, seed: int | None) -> pd.DataFrame:

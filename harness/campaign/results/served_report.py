@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from functools import cached_property
+import sys
+from collections.abc import Callable
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from threading import Lock
 from typing import Any
@@ -13,6 +14,7 @@ from urllib.parse import unquote
 import pandas as pd
 
 from harness.campaign.results.recorded_games import tracks_of
+from harness.campaign.results.replay_game import read_game, traces_of
 from harness.campaign.storage.run_folder import RunFolder
 from harness.errors import UsageError
 from harness.evaluation.people import judged
@@ -21,13 +23,15 @@ from harness.evaluation.trace_file import TraceReader
 from harness.evaluation.worst_first import worst_first
 from harness.reports.embedding import game_text
 from harness.reports.manoeuvres import marks_of
-from harness.reports.page_template import served_page
+from harness.reports.page_template import SERVED_POLICY, served_page
 from harness.reports.run_tables import crowds_of
 from harness.road.scene.open_scene import open_scene
 
 HOST = "127.0.0.1"
 """Only programs of this machine reach the server."""
-_GAME = re.compile(r"/games/(?P<arm>[^/]*),(?P<seed>\d+),(?P<episode>\d+)\.json")
+IDLE_S = 30.0
+"""A connection on which nothing comes for so long is closed."""
+_GAME = re.compile(r"/games/(?P<arm>[^/]*),(?P<seed>\d{1,20}),(?P<episode>\d{1,20})\.json", re.ASCII)
 PAGE, JSON = "text/html; charset=utf-8", "application/json"
 
 
@@ -35,37 +39,35 @@ class ServedReport:
     """What the server of a run's report sends, by path."""
 
     def __init__(self, folder: RunFolder) -> None:
-        """Raises UsageError if the folder has no report, table of games or scene."""
+        """Raises UsageError if the folder has no report, table of games, traces or scene, or others than it wrote."""
         self._folder, self._reader, self._lock = folder, TraceReader(), Lock()
-        for needed in ("report.html", "episodes.csv", "traces"):
-            if not (folder.path / needed).exists():
-                raise UsageError.of(folder.path, needed, "is not there", f"harness report {folder.path}")
+        manifest = folder.manifest()
+        folder.check_unpublished(manifest)
+        self._crowds = crowds_of(manifest)
+        page = folder.result("report.html").read_text(encoding="utf-8")
+        episodes = read_csv(folder.result("episodes.csv"))
+        self._marks = marks_of(read_csv(folder.result("manoeuvres.csv")))
         self._scene = open_scene(folder.scene)
-        episodes = read_csv(folder.path / "episodes.csv")
         played = worst_first(episodes[(episodes["error"] == "") & (episodes["ego_outcome"] != "error")])
         rows: list[Any] = list(played.itertuples())
         self._games = {(game.arm, game.seed, game.episode): game for game in rows}
-        page = (folder.path / "report.html").read_text(encoding="utf-8")
         self._page = served_page(page, [_entry(game) for game in self._games.values()], str(folder.path))
 
     def answer(self, path: str) -> tuple[str, bytes] | None:
-        """Content type and content of a path; None if there is nothing."""
+        """Content type and content of a path; None if there is nothing. Raises UsageError for a game whose traces are
+        missing, or are not those that the campaign wrote."""
         if path in ("/", "/report.html"):
             return PAGE, self._page.encode()
         named = _GAME.fullmatch(path)
         game = self._games.get((unquote(named["arm"]), int(named["seed"]), int(named["episode"]))) if named else None
         return None if game is None else (JSON, self._recorded(game))
 
-    @cached_property
-    def _marks(self) -> Any:
-        file = self._folder.path / "manoeuvres.csv"
-        return marks_of(read_csv(file) if file.is_file() else None)
-
     def _recorded(self, game: Any) -> bytes:
         with self._lock:  # the reader keeps one file open
-            trace = self._reader.read(self._folder.traces_of_arm(game.arm, game.seed), game.episode)
-        crowds = crowds_of(self._folder.manifest())
-        return game_text(tracks_of(trace, self._scene, game), self._marks, crowds).encode()
+            trace = read_game(
+                game, traces_of(self._folder, game.arm, game.seed, game.episode), self._reader, self._scene
+            ).trace
+        return game_text(tracks_of(trace, self._scene, game), self._marks, self._crowds).encode()
 
 
 def _entry(game: Any) -> list[Any]:
@@ -74,13 +76,20 @@ def _entry(game: Any) -> list[Any]:
     return [game.arm, game.persona, game.seed, game.episode, outcome, None if pd.isna(least) else round(least, 2)]
 
 
-def server_of(report: ServedReport, port: int) -> ThreadingHTTPServer:
-    """A server of this machine that answers with a report; port 0 takes a free one. Raises OSError for one in use."""
+def server_of(answer: Callable[[str], tuple[str, bytes] | None], port: int) -> ThreadingHTTPServer:
+    """A server of this machine. `answer` is `ServedReport.answer`; port 0 takes a free one. Raises OSError for one in
+    use."""
 
     class Answers(BaseHTTPRequestHandler):
+        timeout = IDLE_S
+
         def do_GET(self) -> None:
             known = self.headers.get("Host") in (f"{HOST}:{server.server_port}", f"localhost:{server.server_port}")
-            found = report.answer(self.path) if known else None  # another name of this machine may be another site
+            try:
+                found = answer(self.path) if known else None  # another name of this machine may be another site
+            except UsageError as error:
+                self.send_error(500, explain=str(error))
+                return
             if found is None:
                 self.send_error(404)
                 return
@@ -91,8 +100,18 @@ def server_of(report: ServedReport, port: int) -> ThreadingHTTPServer:
             self.end_headers()
             self.wfile.write(content)
 
+        def end_headers(self) -> None:
+            self.send_header("Content-Security-Policy", SERVED_POLICY)
+            self.send_header("X-Content-Type-Options", "nosniff")
+            super().end_headers()
+
         def log_message(self, format: str, *args: Any) -> None:
             """Requests are not printed."""
 
-    server = ThreadingHTTPServer((HOST, port), Answers)
+    class Server(ThreadingHTTPServer):
+        def handle_error(self, request: Any, client_address: Any) -> None:
+            if not isinstance(sys.exc_info()[1], ConnectionError):  # a page that was closed is no error
+                super().handle_error(request, client_address)
+
+    server = Server((HOST, port), Answers)
     return server

@@ -48,12 +48,14 @@ def intact_record(path: Path, top: Path, **facts: Any) -> dict[str, Any] | None:
     return record
 
 
-def mismatches(record: Mapping[str, Any], top: Path) -> list[Path]:
-    """The files below `top` that are not as their checksums say."""
+def mismatches(record: Mapping[str, Any], top: Path, names: Iterable[str] | None = None) -> list[Path]:
+    """The files below `top` that are not as their checksums say: all that have one, or those of these names, each of
+    which must have one."""
     checksums = record.get("files", {})
     if not isinstance(checksums, dict):
         return [top]
-    return [top / name for name, expected in checksums.items() if not _matches(top / name, expected)]
+    names = checksums if names is None else names
+    return [top / name for name in names if not _matches(top / name, checksums.get(name))]
 
 
 def digest_of(inputs: Any) -> str:

@@ -41,6 +41,7 @@ JUDGED = "reference_drivers.csv"
 """The table that the judgement of an arm's failures makes."""
 _PATIENCE_S = 10.0  # the time that workers of a killed command may take to end
 _MOST_MANIFEST_BYTES = 50_000_000
+_RUN = "run the campaign again"
 _ANY_STAGE = {"kind": "training", "name": "", "seed": 0, "status": "done"}
 
 
@@ -48,6 +49,13 @@ def _has_only_locks(folder: Path) -> bool:
     """Whether a folder holds nothing but folders, locks and a log, as a command leaves it that was killed at once."""
     names = [name for _, _, files in os.walk(folder) for name in files if name != LOG]
     return all(name.startswith(("lock", f".{MANIFEST}.")) or name.endswith(".lock") for name in names)
+
+
+def _refuse(files: Sequence[Path], remedy: str) -> None:
+    """Raises UsageError if there is one of these files."""
+    if files:
+        message = "is missing, or is not what the campaign wrote"
+        raise UsageError(Problem(str(file), "", message, remedy) for file in files)
 
 
 @dataclass(frozen=True)
@@ -102,6 +110,16 @@ class RunFolder:
     def segments(self, stage: str) -> Path:
         """The segments of an arm that is not done."""
         return self.work(stage) / "segments"
+
+    @property
+    def results(self) -> Path:
+        """What the results were made from, and their checksums; it is removed when the manifest changes."""
+        return self.path / ".stages" / "results.json"
+
+    @property
+    def is_published(self) -> bool:
+        """Whether this is a run's report and tables only, without checksums and what they are made from."""
+        return self.manifest_file.is_file() and not self.lock.parent.is_dir()
 
     # --- stages --------------------------------------------------------------------------------------------------
 
@@ -160,23 +178,53 @@ class RunFolder:
 
     def check_whole(self, manifest: Mapping[str, Any]) -> None:
         """Raises UsageError where files of the stages are missing, as in a folder that was published without them, or
-        are not what the stages wrote."""
-        done = [name for name, entry in manifest["stages"].items() if entry["status"] == "done"]
-        if done and not any(self.work(name).is_dir() for name in done):
+        are not what the stages wrote, and where the manifest is not that of the results."""
+        self.check_unpublished(manifest)
+        damaged: list[Path] = []
+        for name in (name for name, entry in manifest["stages"].items() if entry["status"] == "done"):
+            record = self.done(name)
+            damaged += [self.work(name) / "done.json"] if record is None else mismatches(record, self.path)
+        _refuse([*damaged, *self._changed_scene(manifest), *self._changed_results(MANIFEST)], _RUN)
+
+    def check_unpublished(self, manifest: Mapping[str, Any]) -> None:
+        """Raises UsageError for a published folder."""
+        if self.is_published:
             message = "holds a report and its tables, but not the files that they are made from"
             remedy = f"read its report.html, or play the games: run campaign {manifest['name']!r} again"
             raise UsageError.of(self.path, "", message, remedy)
-        damaged: list[Path] = []
-        for name in done:
-            record = self.done(name)
-            damaged += [self.work(name) / "done.json"] if record is None else mismatches(record, self.path)
-        damaged += [file for file in sorted(self.scene.glob("*")) if not has_digest(file, manifest["hashes"].values())]
-        if damaged:
-            message, remedy = "is missing, or is not what the campaign wrote", "run the campaign again"
-            raise UsageError(Problem(str(file), "", message, remedy) for file in damaged)
+
+    def check_games(self, stage: str) -> None:
+        """Raises UsageError where the traces of an arm or the scene are not as they were when its games were played. A
+        published folder is not checked."""
+        if not self.is_published:
+            traces = self.traces(stage).relative_to(self.path).as_posix()
+            changed = mismatches(self.done(stage) or {}, self.path, [traces])
+            _refuse([*changed, *self._changed_scene(self.manifest())], _RUN)
+
+    def result(self, name: str) -> Path:
+        """A file of the results. Raises UsageError where it, or the manifest, is not as the results were written, and
+        where the campaign has not ended. A published folder is not checked."""
+        if not self.is_published:
+            remedy = f"write the results of what is finished: harness report {self.path}"
+            if read_checksums(self.results) is None:
+                raise UsageError.of(self.path, "", "has no results: its campaign has not ended", remedy)
+            _refuse(self._changed_results(MANIFEST), _RUN)
+            _refuse(self._changed_results(name), remedy)
+        return self.path / name
+
+    def _changed_results(self, name: str) -> list[Path]:
+        record = read_checksums(self.results)
+        return [] if record is None else mismatches(record, self.path, [name])
+
+    def _changed_scene(self, manifest: Mapping[str, Any]) -> list[Path]:
+        return [file for file in sorted(self.scene.glob("*")) if not has_digest(file, manifest["hashes"].values())]
 
     def write_manifest(self, manifest: Mapping[str, Any]) -> None:
-        write_atomically(self.manifest_file, (json.dumps(manifest, indent=2) + "\n").encode())
+        """Write the manifest, and remove the checksums of results that another one gave."""
+        content = (json.dumps(manifest, indent=2) + "\n").encode()
+        if not self.manifest_file.is_file() or self.manifest_file.read_bytes() != content:
+            self.results.unlink(missing_ok=True)
+            write_atomically(self.manifest_file, content)
 
     def claim(self, campaign: str, quick: bool = False) -> None:
         """Make the folder this campaign's. Raises UsageError if it belongs to another campaign, if it holds a full run
@@ -212,7 +260,7 @@ class RunFolder:
 
         Raises UsageError if another command holds it.
         """
-        if not self.lock.parent.is_dir():  # a published folder: it holds nothing to write from
+        if self.is_published:  # it holds nothing to write from
             yield
             return
         try:
