@@ -21,6 +21,7 @@ import pandas as pd
 from harness.assessment.rollout import SeatedArm, StartTrials
 from harness.campaign.execution.run_players import RunPlayers, SeatedDriver
 from harness.campaign.plan.stages import AssessmentStage
+from harness.campaign.results.read_run import episodes_of
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.persona import Persona
 from harness.config.pinned_game import FORMAT, PinnedGame, PinnedPerson, PinnedStart
@@ -66,7 +67,7 @@ class PinnedGames:
 
     def __init__(self, folder: RunFolder, players: RunPlayers, out: Path) -> None:
         self._players, self._out = players, out
-        self._episodes = read_csv(folder.result("episodes.csv"))
+        self._episodes = episodes_of(folder)
         self._causes = causes_in_words(read_csv(folder.result("causes.csv")))
 
     def failures(self, arm: str | None = None) -> list[RunFailure]:

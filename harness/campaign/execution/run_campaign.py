@@ -67,6 +67,7 @@ def run_campaign(
             console.print(NOTHING_TO_DO, highlight=False)
             LOGGER.info(NOTHING_TO_DO)
             return kept
+        folder.results.unlink(missing_ok=True)  # they are those of another manifest
         if len(finished) < len(stages):
             left = {"what is left": {"kind": "", "status": "done", "versions": [versions_of_numbers()]}}
             warn(mixed_versions(manifest.content["stages"] | left), console)

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from harness.campaign.results.read_run import episodes_of
 from harness.campaign.storage.run_folder import RunFolder
 from harness.errors import UsageError
 from harness.evaluation.comparisons.run_comparison import differences_of
-from harness.evaluation.tables import read_csv
 from harness.files import write_atomically
 from harness.reports.comparison_page import ComparedRow, compared_rows, render_comparison
 
@@ -22,7 +22,7 @@ def compare_runs(before: Path, after: Path, page: Path) -> list[ComparedRow]:
         raise UsageError.of(page, "", f"there is no folder {page.parent}", "create it, or name another file with --out")
     folders = [RunFolder(run) for run in (before, after)]
     manifests = [folder.manifest() for folder in folders]
-    games = [read_csv(folder.result("episodes.csv")) for folder in folders]
+    games = [episodes_of(folder) for folder in folders]
     scenes = [_scene(manifest) for manifest in manifests]
     same_scene = bool(scenes[0]) and scenes[0] == scenes[1]
     significance = manifests[1]["campaign"]["assessment"]["significance"]

@@ -6,7 +6,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from harness.campaign.results.replay_game import PlayedGame, episodes_of, games_of, played_game, read_game, traces_of
+from harness.campaign.results.read_run import episodes_of
+from harness.campaign.results.replay_game import PlayedGame, games_of, played_game, read_game, traces_of
 from harness.campaign.results.shown_work import progress_bar
 from harness.campaign.storage.run_folder import RunFolder
 from harness.errors import UsageError

@@ -85,6 +85,16 @@ def read_run(folder: RunFolder, console: Console) -> ReadRun:
     )
 
 
+def episodes_of(folder: RunFolder) -> pd.DataFrame:
+    """The rows of `episodes.csv`. Raises UsageError unless the folder is one of a run that has games, with the results
+    that it wrote."""
+    folder.manifest()
+    episodes = read_csv(folder.result("episodes.csv"))
+    if episodes.empty:
+        raise UsageError.of(folder.path, "", "has no games: none of its arms is finished", "run the campaign again")
+    return episodes
+
+
 def _done(manifest: Mapping[str, Any], kind: str) -> list[str]:
     entries = manifest["stages"].items()
     return [name for name, entry in entries if entry["kind"] == kind and entry["status"] == "done"]

@@ -17,6 +17,7 @@ from rich.table import Table
 from rich.text import Text
 
 from harness.campaign.plan.stages import stage_id
+from harness.campaign.results.read_run import episodes_of
 from harness.campaign.results.shown_work import progress_bar
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.toml_reading import nearest
@@ -234,18 +235,12 @@ def film(game: PlayedGame, file: Path, console: Console) -> None:
     console.print(f"Wrote {file}: {pictures} pictures.", highlight=False, markup=False, soft_wrap=True)
 
 
-def episodes_of(folder: RunFolder) -> pd.DataFrame:
-    """The rows of `episodes.csv`. Raises UsageError unless the folder is one of a run, with the results it wrote."""
-    folder.manifest()
-    return read_csv(folder.result("episodes.csv"))
-
-
 def games_of(run: Path, episodes: pd.DataFrame, arm: str | None, seed: int | None) -> pd.DataFrame:
     """The rows of an arm and of a training seed; None is every one. Raises UsageError if there are none."""
     if arm is not None:
         arms = sorted(set(episodes["arm"]))
         if arm not in arms:
-            raise UsageError.of(run, arm, "has no such arm", nearest(arm, arms or ["(no arm is done yet)"]))
+            raise UsageError.of(run, arm, "has no such arm", nearest(arm, arms))
         episodes = episodes[episodes["arm"] == arm]
     if seed is not None:
         seeds = sorted(set(episodes["seed"]))

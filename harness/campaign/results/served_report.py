@@ -13,6 +13,7 @@ from urllib.parse import unquote
 
 import pandas as pd
 
+from harness.campaign.results.read_run import episodes_of
 from harness.campaign.results.recorded_games import tracks_of
 from harness.campaign.results.replay_game import read_game, traces_of
 from harness.campaign.storage.run_folder import RunFolder
@@ -45,7 +46,7 @@ class ServedReport:
         folder.check_unpublished(manifest)
         self._crowds = crowds_of(manifest)
         page = folder.result("report.html").read_text(encoding="utf-8")
-        episodes = read_csv(folder.result("episodes.csv"))
+        episodes = episodes_of(folder)
         self._marks = marks_of(read_csv(folder.result("manoeuvres.csv")))
         self._scene = open_scene(folder.scene)
         played = worst_first(episodes[(episodes["error"] == "") & (episodes["ego_outcome"] != "error")])

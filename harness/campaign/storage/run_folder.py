@@ -113,7 +113,7 @@ class RunFolder:
 
     @property
     def results(self) -> Path:
-        """What the results were made from, and their checksums; it is removed when the manifest changes."""
+        """What the results were made from, and their checksums. A campaign that has something to do removes it."""
         return self.path / ".stages" / "results.json"
 
     @property
@@ -220,11 +220,7 @@ class RunFolder:
         return [file for file in sorted(self.scene.glob("*")) if not has_digest(file, manifest["hashes"].values())]
 
     def write_manifest(self, manifest: Mapping[str, Any]) -> None:
-        """Write the manifest, and remove the checksums of results that another one gave."""
-        content = (json.dumps(manifest, indent=2) + "\n").encode()
-        if not self.manifest_file.is_file() or self.manifest_file.read_bytes() != content:
-            self.results.unlink(missing_ok=True)
-            write_atomically(self.manifest_file, content)
+        write_atomically(self.manifest_file, (json.dumps(manifest, indent=2) + "\n").encode())
 
     def claim(self, campaign: str, quick: bool = False) -> None:
         """Make the folder this campaign's. Raises UsageError if it belongs to another campaign, if it holds a full run
