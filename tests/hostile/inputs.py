@@ -21,6 +21,7 @@ import pytest
 from rich.console import Console
 
 from harness.campaign.results.results import write_results
+from harness.campaign.storage.checksums import checksums_of
 from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.run_log import LOG
 from harness.cli.main import main
@@ -274,17 +275,27 @@ def _build_project(project: Path) -> None:
 
 
 def write_run(folder: Path) -> Path:
-    """A run folder, in order, without what no command reads, and without seals: who changes a file on purpose can seal
-    it as well. A copy of one that is written once."""
-    return Path(shutil.copytree(built_once("run_without_seals", _build_run) / "run", folder / "project" / "run"))
+    """A run folder, in order, without what no command reads. A copy of one that is written once."""
+    return Path(shutil.copytree(built_once("run_to_spoil", _build_run) / "run", folder / "project" / "run"))
 
 
 def _build_run(folder: Path) -> None:
     unread = shutil.ignore_patterns("tensorboard", "checkpoint.safetensors")
     run = shutil.copytree(sumo_run(), folder / "run", ignore=unread)
-    for seal in run.glob(".stages/*/done.json"):
-        seal.write_text(json.dumps({**json.loads(seal.read_text(encoding="utf-8")), "files": {}}), encoding="utf-8")
+    for record in run.glob(".stages/*/done.json"):
+        document = json.loads(record.read_text(encoding="utf-8"))
+        kept = {name: each for name, each in document["files"].items() if (run / name).is_file()}
+        record.write_text(json.dumps({**document, "files": kept}), encoding="utf-8")
     write_results(RunFolder(run), Console(quiet=True))  # its record of what the results were made from fits again
+
+
+def seal(run: Path) -> None:
+    """Make the checksums of a run folder fit its files: who changes a file on purpose can change those as well."""
+    for record in (run / ".stages" / "results.json", *run.glob(".stages/*/done.json")):
+        if record.is_file():
+            document = json.loads(record.read_text(encoding="utf-8"))
+            document["files"] |= checksums_of(run, [run / name for name in document["files"] if (run / name).is_file()])
+            record.write_text(json.dumps(document), encoding="utf-8")
 
 
 def traces_of(folder: Path) -> dict[str, str]:
@@ -350,6 +361,7 @@ class Desk:
     def refuses(self, bad: Bad) -> None:
         """Spoil the project and see that the command says so, as it must."""
         bad.spoil(self.project)
+        seal(self.project / "run")
         before, running = traces_of(self.folder), children()
         said = self.run(bad.command)
         assert_refused(said, bad.words)

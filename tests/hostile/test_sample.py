@@ -13,7 +13,7 @@ import pytest
 from tests.hostile.bad_documents import CAMPAIGNS, PERSONAS, POLICIES, SCENES
 from tests.hostile.bad_roads import NETS, ROUTE_FILES
 from tests.hostile.bad_run_folders import RUNS
-from tests.hostile.inputs import CHECK, Bad, Said, assert_refused, traces_of, write_project, write_run
+from tests.hostile.inputs import CHECK, Bad, Said, assert_refused, seal, traces_of, write_project, write_run
 from tests.support.processes import in_session
 from tests.support.tiny import HARNESS, PATIENCE_S
 
@@ -73,6 +73,7 @@ def test_command__refuses_a_bad_input_and_leaves_nothing_behind(bad: Bad, tmp_pa
     if bad.command != CHECK:
         write_run(tmp_path)
     bad.spoil(project)
+    seal(project / "run")
     for name in ("here", "scratch"):
         (tmp_path / name).mkdir()
     before = traces_of(tmp_path)

@@ -16,7 +16,6 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from harness.campaign.plan.stages import stage_id
 from harness.campaign.results.read_run import episodes_of
 from harness.campaign.results.shown_work import progress_bar
 from harness.campaign.storage.run_folder import RunFolder
@@ -197,7 +196,7 @@ def traces_of(folder: RunFolder, arm: str, seed: int, episode: int) -> Path:
             "was recorded, but this folder does not contain the traces",
             f"watch it in {folder.path / 'report.html'}, or run campaign {folder.manifest()['name']!r} again",
         )
-    folder.check_games(stage_id(arm, seed))
+    folder.check_games(arm, seed)
     return traces
 
 

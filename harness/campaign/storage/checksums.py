@@ -65,7 +65,7 @@ def digest_of(inputs: Any) -> str:
 
 def _matches(file: Path, expected: Any) -> bool:
     try:
-        return file.stat().st_size == expected["bytes"] and _checksum(file) == expected
+        return file.is_file() and file.stat().st_size == expected["bytes"] and _checksum(file) == expected
     except (OSError, LookupError, TypeError, ValueError):
         return False
 

@@ -193,12 +193,12 @@ class RunFolder:
             remedy = f"read its report.html, or play the games: run campaign {manifest['name']!r} again"
             raise UsageError.of(self.path, "", message, remedy)
 
-    def check_games(self, stage: str) -> None:
+    def check_games(self, arm: str, seed: int) -> None:
         """Raises UsageError where the traces of an arm or the scene are not as they were when its games were played. A
         published folder is not checked."""
         if not self.is_published:
-            traces = self.traces(stage).relative_to(self.path).as_posix()
-            changed = mismatches(self.done(stage) or {}, self.path, [traces])
+            traces = self.traces_of_arm(arm, seed).relative_to(self.path).as_posix()
+            changed = mismatches(self.done(stage_id(arm, seed)) or {}, self.path, [traces])
             _refuse([*changed, *self._changed_scene(self.manifest())], _RUN)
 
     def result(self, name: str) -> Path:

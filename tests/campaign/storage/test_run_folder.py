@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from harness.campaign.storage.checksums import write_checksums
 from harness.campaign.storage.manifest import FORMAT
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.persona import Persona
@@ -116,6 +118,34 @@ def test_manifest__of_another_format_is_refused_in_one_line(folder: RunFolder) -
 def test_manifest__of_no_run_folder(name: str, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("x")
     assert "is not a run folder" in problem_of(RunFolder(tmp_path / name).manifest)
+
+
+# --- results ----------------------------------------------------------------------------------------------------------
+
+
+def test_result__is_read_only_as_it_was_written_beside_its_manifest(folder: RunFolder) -> None:
+    table = folder.path / "summary.csv"
+    assert "has no results: its campaign has not ended" in problem_of(lambda: folder.result("summary.csv"))
+    table.write_bytes(b"arm\n")
+    write_checksums(folder.results, folder.path, [table, folder.manifest_file], {})
+    assert folder.result("summary.csv") == table
+    (folder.path / "causes.csv").write_bytes(b"arm\n")  # the results did not have it
+    table.write_bytes(b"arm,\n")
+    for name in ("summary.csv", "causes.csv", "gone.csv"):
+        said = problem_of(partial(folder.result, name))
+        assert said.startswith(f"{folder.path / name}: is missing, or is not what the campaign wrote (")
+        assert f"harness report {folder.path}" in said
+    folder.check_whole(folder.manifest())
+    folder.write_manifest({**MANIFEST, "seeds": [1, 2]})
+    for action in (lambda: folder.result("summary.csv"), lambda: folder.check_whole(folder.manifest())):
+        assert problem_of(action).startswith(f"{folder.manifest_file}: is missing, or is not what the campaign wrote (")
+
+
+def test_result__of_a_published_folder_is_not_checked(tmp_path: Path) -> None:
+    folder = RunFolder(tmp_path)
+    folder.write_manifest(MANIFEST)
+    assert folder.is_published
+    assert folder.result("summary.csv") == tmp_path / "summary.csv"
 
 
 # --- stages -----------------------------------------------------------------------------------------------------------
