@@ -15,7 +15,7 @@ import pandas as pd
 
 from harness.campaign.results.read_run import episodes_of
 from harness.campaign.results.recorded_games import tracks_of
-from harness.campaign.results.replay_game import read_game, traces_of
+from harness.campaign.results.replay_game import read_trace, traces_of
 from harness.campaign.storage.run_folder import RunFolder
 from harness.errors import UsageError
 from harness.evaluation.people import judged
@@ -65,9 +65,8 @@ class ServedReport:
 
     def _recorded(self, game: Any) -> bytes:
         with self._lock:  # the reader keeps one file open
-            trace = read_game(
-                game, traces_of(self._folder, game.arm, game.seed, game.episode), self._reader, self._scene
-            ).trace
+            traces = traces_of(self._folder, game.arm, game.seed, game.episode)
+            trace = read_trace(traces, game.episode, self._reader)
         return game_text(tracks_of(trace, self._scene, game), self._marks, self._crowds).encode()
 
 
