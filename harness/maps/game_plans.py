@@ -252,7 +252,8 @@ def _timed(candidate: Candidate, *, ego_route: PlannedRoute, route: PlannedRoute
     point = line[min(round(found.ego_m / SPACING_M), len(line) - 1)]
     if float(np.hypot(*(point - candidate.place))) > within_m:
         return None
-    tries = (_BEFORE_LIGHTS, *_TRIES) if ego_route.lights or route.lights else _TRIES
+    has_lights = any(at_m <= each.junction_m for each in (ego_route, route) for at_m, _ in each.lights)
+    tries = (_BEFORE_LIGHTS, *_TRIES) if has_lights else _TRIES
     for slower, seconds in tries:
         speed, other = _speeds(ego_route.limit_mps, slower), _speeds(route.limit_mps, slower)
         start = _ego_start(found.ego_m, speed, seconds)

@@ -45,7 +45,7 @@ class PlannedRoute:
     goal_edge: str
     goal_position_m: float
     limit_mps: float  # the lowest speed limit of the edges before the junction
-    lights: tuple[tuple[float, str], ...]  # up to the junction: station and id of each traffic light
+    lights: tuple[tuple[float, str], ...]  # station and id of each traffic light up to the goal
     turns_deg: tuple[float, ...]  # at each junction, without sign
     refusal: str  # the reason against a route on which no game is offered; empty if there is none
 
@@ -112,8 +112,8 @@ def _with_goal(net: Net, edges: Sequence[Edge], place: int) -> PlannedRoute | No
         goal_position_m=float(np.floor(10.0 * share * edges[k].getLength()) / 10.0),
         limit_mps=limit_mps,
         lights=tuple(
-            (ends[k], name)
-            for k, edge in enumerate(before)
+            (end_m, name)
+            for end_m, edge in zip(ends, edges[:k], strict=False)
             for name in sorted({link.getTLSID() for link in _onward(edge) if link.getTLSID()})
         ),
         turns_deg=turns_deg,

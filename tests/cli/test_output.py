@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.run_log import LOG
 from harness.evaluation.tables import read_csv
 from tests.support.tiny import BY_SUMO, MERGE, harness, sumo_run, write_campaign
@@ -83,10 +84,14 @@ def test_report__quiet_prints_nothing_if_nothing_failed(run: Path) -> None:
 
 def test_report__quiet_prints_what_failed(run: Path) -> None:
     manifest = json.loads((run / "manifest.json").read_text(encoding="utf-8"))
-    manifest["stages"]["naive_alone-seed1"]["status"] = "failed"
+    manifest["stages"]["naive_alone-seed1"] |= {"status": "failed", "message": "a.parquet: No space left on device"}
     (run / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
+    RunFolder(run).results.unlink()  # they are of the manifest before
     done = harness("report", run, "-q")
-    assert (done.returncode, done.stdout) == (1, "Not finished: naive_alone-seed1\n")
+    assert (done.returncode, done.stdout) == (
+        1,
+        "Not finished: naive_alone-seed1\n  a.parquet: No space left on device\n",
+    )
 
 
 def test_report__verbose_prints_the_log(run: Path) -> None:
