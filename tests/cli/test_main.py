@@ -194,7 +194,12 @@ def test_main__an_error_of_sumo_is_one_message(
 def test_campaign__ended_while_it_is_read_says_that_it_continues(
     number: signal.Signals, code: int, run_command: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    before = {each: signal.signal(each, signal.SIG_DFL) for each in (signal.SIGTERM, signal.SIGHUP)}
+    at_start = {
+        signal.SIGTERM: signal.SIG_DFL,
+        signal.SIGHUP: signal.SIG_DFL,
+        signal.SIGINT: signal.default_int_handler,
+    }
+    before = {each: signal.signal(each, handler) for each, handler in at_start.items()}
     monkeypatch.setattr(cli, "document_at", lambda *_: signal.raise_signal(number))
     try:
         assert run_command("campaign", "merge") == (code, f"{messages.INTERRUPTED}\n", "")

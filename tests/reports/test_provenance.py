@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from harness.campaign.storage.run_folder import RunFolder
 from harness.reports.provenance import MIXED_VERSIONS, mixed_versions
 from tests.support.tiny import harness, sumo_run
 
@@ -46,6 +47,7 @@ def test_run__that_mixes_versions_warns_on_the_terminal_and_on_the_page(command:
             entry = entry[key]
         entry["versions"][0]["numpy"] = "1.0"
         file.write_text(json.dumps(document))
+    RunFolder(run).results.unlink()  # they are of the manifest before
     more = ("report", run) if command == "report" else ("campaign", sumo_run().with_suffix(".toml"), "--out", run)
     done = harness(*more)
     assert done.returncode == 0, done.stderr

@@ -44,7 +44,8 @@ _INTEGERS = {
     "connection": ("fromLane", "toLane", "linkIndex", "linkIndex2"),
     "request": ("index",),
 }
-_INDEX, _PRIORITY = re.compile(r"\d{1,6}", re.ASCII), re.compile(r"-?\d{1,6}", re.ASCII)
+_MAY_BE_NEGATIVE = ("priority", "linkIndex", "linkIndex2")  # netconvert writes a link index of -1 where no light rules
+_INDEX, _INTEGER = re.compile(r"\d{1,6}", re.ASCII), re.compile(r"-?\d{1,6}", re.ASCII)
 _CHILDREN = {
     "net": "location type edge tlLogic junction connection prohibition roundabout taz",
     "type": "restriction meso laneType",
@@ -94,7 +95,7 @@ def _attribute_faults(root: ElementTree.Element) -> Iterator[tuple[str, str]]:
                     yield f"{where}.{name}", "is missing or empty"
             for name in _INTEGERS.get(element.tag, ()):
                 value = element.get(name)
-                if value and not (_PRIORITY if name == "priority" else _INDEX).fullmatch(value):
+                if value and not (_INTEGER if name in _MAY_BE_NEGATIVE else _INDEX).fullmatch(value):
                     yield f"{where}.{name}", f"{value[:60]!r} is not an integer that is possible here"
 
 
