@@ -128,6 +128,7 @@ NETS = [
                     ("a connection from a lane", LINK, LINK.replace('fromLane="1"', 'fromLane="{}"'), "connection from approach to exit.fromLane"),
                     ("a connection's light", LINK, LIT.replace('"2"', '"{}"'), "connection from approach to exit.linkIndex"),
                 )
+                if (what, value) != ("a connection's light", "-1")  # netconvert writes it where no light rules
             ),
             ("an edge of no function", '<edge id=":taper_0" function="internal"', '<edge id=":taper_0" function="internl"', ("edge :taper_0.function", "'internal'")),
             ("a priority", EDGE, EDGE.replace("-1", "-0.0"), ("edge exit.priority", "not an integer")),
