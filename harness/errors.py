@@ -10,7 +10,8 @@ HarnessError                 any error that the harness raises
 
 from __future__ import annotations
 
-import resource
+import math
+import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from errno import EDQUOT, EFBIG, EIO, ENOSPC, EROFS
@@ -116,10 +117,20 @@ def short_of_memory(error: BaseException) -> str:
     return f"the machine is short of memory: {str(error) or 'no more could be allocated'} ({remedy})"
 
 
+def address_space_bytes() -> float:
+    """The limit of this process's address space; infinity without one, and on Windows, which has none."""
+    if sys.platform == "win32":
+        return math.inf
+    import resource
+
+    limit_bytes = resource.getrlimit(resource.RLIMIT_AS)[0]
+    return math.inf if limit_bytes == resource.RLIM_INFINITY else float(limit_bytes)
+
+
 def limited_memory() -> str:
     """The limit of this process's address space and how to raise it, in words; empty without a limit."""
-    limit_bytes = resource.getrlimit(resource.RLIMIT_AS)[0]
-    if limit_bytes == resource.RLIM_INFINITY:
+    limit_bytes = address_space_bytes()
+    if limit_bytes == math.inf:
         return ""
     return f"each process may use {limit_bytes / 1e9:.1f} GB of address space: raise this limit, ulimit -v"
 

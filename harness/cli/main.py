@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import resource
 import signal
 import sys
 from collections.abc import Callable, Iterator
@@ -37,6 +36,7 @@ from harness.errors import (
     USAGE_ERROR,
     HarnessError,
     UsageError,
+    address_space_bytes,
     is_of_memory,
     of_system,
     short_of_memory,
@@ -263,10 +263,12 @@ def _interruptible(console: Console) -> Iterator[None]:
 
 def _check_address_space() -> None:
     """Raise UsageError for a limit with which libraries abort this process when it writes the results."""
-    limit_bytes = resource.getrlimit(resource.RLIMIT_AS)[0]
-    if resource.RLIM_INFINITY != limit_bytes < _ADDRESS_SPACE_BYTES:
+    limit_bytes = address_space_bytes()
+    if limit_bytes < _ADDRESS_SPACE_BYTES:
         message = "is too little address space: the command needs 2.5 GB, workers that train need 4 GB"
-        raise UsageError.of("ulimit -v", f"{limit_bytes // 1024} kB", message, "raise the limit: ulimit -v unlimited")
+        raise UsageError.of(
+            "ulimit -v", f"{limit_bytes // 1024:.0f} kB", message, "raise the limit: ulimit -v unlimited"
+        )
 
 
 def _fail(message: str, code: int) -> NoReturn:
