@@ -16,7 +16,7 @@ from harness.game.state import Bodies, State
 from harness.game.world import World
 from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.repository import REPOSITORY
-from tests.support.scenes import run_sumo_program
+from tests.support.scenes import build_scene, run_sumo_program
 from tests.support.shared import shared_folder
 from tests.support.slow import slow_tests
 from tests.support.stations import nearest_station_m
@@ -50,6 +50,12 @@ def repository() -> Path:
 def merge(repository: Path) -> OpenScene:
     """The scene tests/data/merge, opened: a merge whose numbers stay while networks/merge is worked on."""
     return open_scene(repository / "tests" / "data" / "merge")
+
+
+@pytest.fixture(scope="session")
+def straight(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
+    """A road of 300 m with two lanes and the two players."""
+    return build_scene(tmp_path_factory.mktemp("scenes") / "straight")
 
 
 @pytest.fixture(scope="session")

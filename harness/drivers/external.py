@@ -1,12 +1,6 @@
 """External drivers: drivers that a campaign does not train. They are found, hashed, and made for a car.
 
-| in the campaign | is |
-| --- | --- |
-| `driver = "policies/naive-seed1"` | the folder of a policy |
-| `driver = "merge/naive-seed1"` | a shipped policy |
-| `driver = "egos/adas.toml"` | a driver document, see `harness.config.driver` |
-| `driver = "adas"` | a shipped driver document |
-| `driver = "my_driver"` | an installed package's entry point, see `harness.drivers.entry_points` |
+docs/egos.md says what `driver` of a campaign may be.
 
 Programs, FMUs and files of Stable-Baselines3 are code in files. Campaigns are documents that people exchange: neither a
 campaign nor a driver document may start such code. It runs only with the permission of the user, given on the command

@@ -68,8 +68,9 @@ def other_games(folder: Path, scene: Scene, world: World, *, player: int, person
     pairs = {"scene": (origin.scene, scene.name), "player": (origin.player, ROLES[player])}
     if origin.step_s is not None:
         pairs["step_s"] = (f"{origin.step_s:g}", f"{world.step_s:g}")
-    if origin.friction is not None and not _is_within(_friction(scene), origin.friction):
-        pairs["friction"] = (_range(origin.friction), _range(_friction(scene)))
+    low, high = _friction(scene)
+    if origin.friction is not None and not origin.friction[0] <= low <= high <= origin.friction[1]:
+        pairs["friction"] = (_range(origin.friction), _range((low, high)))
     if persona is not None and origin.persona_sha256 not in (None, persona_hash(persona)):
         of_same_name = " with another payoff or other limits" if origin.persona == persona.name else ""
         pairs["persona"] = (origin.persona, persona.name + of_same_name)
@@ -100,10 +101,6 @@ def _of_car(car: Mapping[str, float]) -> str:
 
 def _friction(scene: Scene) -> tuple[float, float]:
     return scene.varies.friction or (scene.friction, scene.friction)
-
-
-def _is_within(friction: tuple[float, float], known: tuple[float, float]) -> bool:
-    return known[0] <= friction[0] and friction[1] <= known[1]
 
 
 def _range(friction: tuple[float, float]) -> str:

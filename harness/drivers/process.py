@@ -1,14 +1,7 @@
 """A program as a driver: one line of JSON per message and per answer over its standard streams, with a deadline.
 
-| message | answer |
-| --- | --- |
-| `{"type": "hello", "protocol": 2, "units": …, "layout": […], "step_s": …, "limits": {…}}` | `{"protocol": 2}` |
-| `{"type": "reset", "games": […]}` | `{}` |
-| `{"type": "decide", "games": […], "observation": [[…], …], "noise": [[…], …]}` | `{"actions": [[…, …], …]}` |
-
-If the program has parameters, `hello` ends with `"parameters": {…}`. A program may answer any message with
-`{"error": "…"}`. A program that crashes, misses a deadline or sends an invalid answer is killed, and its game fails;
-the next game starts a new process. The program is killed with its driver and with the harness.
+The messages are those of docs/egos.md. A program that crashes, misses a deadline or sends an invalid answer is killed,
+and its game fails; the next game starts a new process. The program is killed with its driver and with the harness.
 """
 
 from __future__ import annotations

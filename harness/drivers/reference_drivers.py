@@ -1,15 +1,7 @@
-"""Reference drivers: the yardsticks by which a failure counts as preventable.
+"""Reference drivers: the yardsticks by which a failure counts as preventable (docs/preventability.md).
 
-| name | driver | reaction |
-| --- | --- | --- |
-| `careful_and_competent` | the careful and competent human driver of UN R157 | 0.75 s, then up to 0.774 g or 0.85 g |
-| `fuzzy` | the fuzzy safety model of UN R157 | 0.75 s, then graded up to 0.774 g |
-| `rss` | responsibility-sensitive safety | 0.75 s, then 0.774 g |
-| `upper_bound` | brakes in the step in which the first of these rules says danger | none; as hard as the tyres allow |
-
-All cruise by the same adaptive cruise control and keep their lane by the same lane keeping, which are not part of the
-models. The upper bound is no driver that exists: none reacts sooner or brakes harder. It bounds what braking can do for
-a road user ahead. Where ways cross, a driver who brakes less may pass before the other.
+The upper bound is no driver that exists: none reacts sooner or brakes harder. It bounds what braking can do for a road
+user ahead. Where ways cross, a driver who brakes less may pass before the other.
 """
 
 from __future__ import annotations
@@ -68,11 +60,11 @@ def reference_identity() -> dict[str, Any]:
     return {name: reference_rules(name, usual_m).model_dump(mode="json") for name in PERSONS}
 
 
-def lane_width_of(world: World, player: int = EGO) -> float:
-    """The usual width of the lanes of a player's road: the distance between the centres of neighbouring lanes. The
+def lane_width_of(world: World) -> float:
+    """The usual width of the lanes of the ego's road: the distance between the centres of neighbouring lanes. The
     default of the careful and competent driver where the road has one lane."""
     routes = world.road.routes
-    rows = slice(int(routes.first_row[player]), int(routes.last_row[player]) + 1)
+    rows = slice(int(routes.first_row[EGO]), int(routes.last_row[EGO]) + 1)
     apart_m = np.diff(np.sort(routes.lane_offset_m[rows], axis=1), axis=1)
     apart_m = apart_m[np.isfinite(apart_m)]
     if not len(apart_m):

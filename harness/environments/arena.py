@@ -1,18 +1,7 @@
 """The arena: G games in one SUMO simulation. Its step is the only stepping loop of the harness.
 
-| order | part of a step | module |
-| --- | --- | --- |
-| 1 | drivers decide from the observations of the step before; learners' actions are an argument | `drivers` |
-| 2 | reaction delay, limits of the controls and lapses of attention | `game.human_factors` |
-| 3 | the players move, on wheels or on foot | `game.bicycle`, `game.walking` |
-| 4 | their poses are sent to SUMO, SUMO moves the other vehicles, their state is read | `sumo.simulation` |
-| 5 | contact, goal and time limit determine outcomes | `game.quantities` |
-| 6 | payoffs are computed | `game.payoff` |
-| 7 | a player at its goal is removed; a crashed player stays as an obstacle | this module |
-| 8 | observations are computed | `game.observation` |
-
-Impossible numbers end the step with an error (`game.sanity_checks`): decisions are checked before 3, motion and payoffs
-before 7, observations after 8.
+docs/architecture.md has the eight parts of a step. Impossible numbers end it with an error (`game.sanity_checks`):
+decisions are checked before part 3, motion and payoffs before part 7, observations after part 8.
 
 The random numbers of a game are drawn when it is reset (`game.initial_state`). Training and assessment use this loop.
 """

@@ -17,7 +17,7 @@ from pettingzoo import ParallelEnv
 from harness.drivers.policy_file import ACTIONS
 from harness.environments.arena import LiveSimulation, Seat
 from harness.environments.seating import PERSONA, SCENE, Place, opened_scene, read_persona, seating_of
-from harness.environments.single_game import RENDER_MODES, Info, SingleGame
+from harness.environments.single_game import RENDER_MODES, Info, SingleGame, space_of
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray
 from harness.game.observation_layout import SIZE
@@ -116,8 +116,7 @@ class DrivingEnv(LiveSimulation, gymnasium.Env[Any, Any]):
         self.metadata = {**self.metadata, **self._game.metadata}
         self._running = False
         self.render_mode = render_mode
-        self.observation_space = _observation_space()
-        self.action_space = _action_space()
+        self.observation_space, self.action_space = space_of(SIZE), space_of(ACTIONS)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[FloatArray, Info]:
         """Reset to the next game that the generator draws, or to the episode that `options` name. Raises UsageError for
@@ -201,8 +200,8 @@ class ParallelDrivingEnv(LiveSimulation, ParallelEnv[str, FloatArray, FloatArray
         self.render_mode = render_mode
         self.possible_agents = list(self._roles)
         self.agents: list[str] = []
-        self.observation_spaces = {agent: _observation_space() for agent in self._roles}
-        self.action_spaces = {agent: _action_space() for agent in self._roles}
+        self.observation_spaces = {agent: space_of(SIZE) for agent in self._roles}
+        self.action_spaces = {agent: space_of(ACTIONS) for agent in self._roles}
 
     def observation_space(self, agent: str) -> gymnasium.spaces.Box:
         """An agent's observation space, Box(-1, 1, (98,), float32)."""
@@ -252,11 +251,3 @@ class ParallelDrivingEnv(LiveSimulation, ParallelEnv[str, FloatArray, FloatArray
         """Close the SUMO simulation. The environment can't be used afterwards."""
         self.agents = []
         self._game.close()
-
-
-def _observation_space() -> gymnasium.spaces.Box:
-    return gymnasium.spaces.Box(-1.0, 1.0, (SIZE,), np.float32)
-
-
-def _action_space() -> gymnasium.spaces.Box:
-    return gymnasium.spaces.Box(-1.0, 1.0, (ACTIONS,), np.float32)

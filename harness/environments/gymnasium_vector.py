@@ -13,7 +13,7 @@ from harness.drivers.policy_file import ACTIONS
 from harness.environments.arena import Arena, LiveSimulation
 from harness.environments.auto_reset import AutoReset
 from harness.environments.seating import PERSONA, SCENE, Place, seating_of
-from harness.environments.single_game import checked_actions
+from harness.environments.single_game import checked_actions, numbers_of
 from harness.environments.vector_env import ACTION_SPACE, OBSERVATION_SPACE, ArenaVecEnv
 from harness.errors import UsageError
 from harness.game.arrays import BoolArray, FloatArray
@@ -122,15 +122,7 @@ class VectorDrivingEnv(LiveSimulation, gymnasium.vector.VectorEnv[Any, Any, Any]
 
     def _info(self, state: State, of: BoolArray | None = None) -> dict[str, Any]:
         """The numbers [G] of the games in `of` [G], each with its mask."""
-        outcome, station_m = state.outcome[:, self._learner], state.station_m[:, self._learner]
-        numbers = {
-            "outcome": outcome.copy(),
-            "is_success": outcome == Outcome.GOAL,
-            "station_m": station_m.copy(),
-            "goal_m": self.arena.world.road.routes.goal_m[self._learner] - station_m,
-            "speed_mps": state.speed_mps[:, self._learner].copy(),
-            "time_s": state.step * self.arena.world.step_s,
-        }
+        numbers = numbers_of(state, self.arena.world, self._learner)
         mask = np.ones(self.num_envs, dtype=bool) if of is None else of
         return numbers | {f"_{name}": mask.copy() for name in numbers}
 

@@ -34,26 +34,11 @@ class NearbyBodies:
 
         `state` is that of `games`; `reading` is that of all games.
         """
-        bodies = Bodies(
-            x_m=state.x_m,
-            y_m=state.y_m,
-            heading_rad=state.heading_rad,
-            speed_mps=state.speed_mps,
-            length_m=self._length_m[games],
-            width_m=self._width_m[games],
-            present=state.present.copy(),
-        )
+        pose = (state.x_m, state.y_m, state.heading_rad)
+        sizes_m = (self._length_m[games], self._width_m[games])
+        bodies = Bodies(*pose, state.speed_mps, *sizes_m, state.present.copy())
         if reading is not None and reading.present.size:
-            background = Bodies(
-                x_m=reading.x_m[games],
-                y_m=reading.y_m[games],
-                heading_rad=reading.heading_rad[games],
-                speed_mps=reading.speed_mps[games],
-                length_m=reading.length_m[games],
-                width_m=reading.width_m[games],
-                present=reading.present[games],
-            )
-            bodies = bodies.with_nearest(background)
+            bodies = bodies.with_nearest(Bodies(*(getattr(reading, name)[games] for name in Bodies._fields)))
         if not self._obstacles.each:
             return bodies
         standing = (*np.moveaxis(self.poses[games], -1, 0), *(each[games] for each in self._at_rest))

@@ -27,13 +27,8 @@ def _opened(folder: Path, ego_type: str) -> OpenScene:
 
 
 def kinds_of(scene: OpenScene) -> Mapping[str, BodyKind]:
-    """The kind of each vehicle type of a scene, by its name in traces."""
-    types = scene.routes.types.items()
-    kinds = {
+    """The kind of each vehicle type of a scene, and of its obstacles, by its name in traces."""
+    return {
         name: BodyKind(length_m=each.length_m, width_m=each.width_m, vehicle_class=each.vehicle_class)
-        for name, each in types
+        for name, each in scene.routes.types.items()
     }
-    standing = {
-        each.vehicle_type: BodyKind(length_m=each.length_m, width_m=each.width_m) for each in scene.obstacles.each
-    }
-    return kinds | standing

@@ -10,9 +10,11 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from harness.game.arrays import FloatArray
+from harness.game.geometry import Box
 from harness.game.state import Bodies
 from harness.road.net.network import read_net
 from harness.road.scene.drawing import goal_lines, lane_marks, surfaces
+from harness.road.scene.open_obstacles import polygon_of
 from harness.road.scene.open_scene import OpenScene
 
 SIZE_PX = (640, 320)
@@ -55,7 +57,9 @@ class ScenePicture:
                 draw.line(pixels(line), fill=colour, width=round(width_m * scale))
         for body in reversed(range(bodies.x_m.shape[1])):  # the players last: above everything
             if bodies.present[game, body]:
-                draw.polygon(pixels(_corners(bodies, game, body)), fill=self._colour(bodies, body), outline=_OUTLINE)
+                outline = polygon_of(Box(*(float(each[game, body]) for each in bodies.boxes))).exterior
+                corners = pixels(np.array(outline.coords))
+                draw.polygon(corners, fill=self._colour(bodies, body), outline=_OUTLINE)
         return np.asarray(image.resize(SIZE_PX, Image.Resampling.BOX))
 
     def _colour(self, bodies: Bodies, body: int) -> str:
@@ -63,16 +67,6 @@ class ScenePicture:
         if body < players:
             return _PLAYERS[body]
         return _OBSTACLE if body >= bodies.x_m.shape[1] - obstacles else _BACKGROUND
-
-
-def _corners(bodies: Bodies, game: int, body: int) -> FloatArray:
-    """[4, 2] the corners of a body."""
-    x_m, y_m, heading_rad, length_m, width_m = (
-        float(getattr(bodies, name)[game, body]) for name in ("x_m", "y_m", "heading_rad", "length_m", "width_m")
-    )
-    along = 0.5 * length_m * np.array([np.cos(heading_rad), np.sin(heading_rad)])
-    across = 0.5 * width_m * np.array([-np.sin(heading_rad), np.cos(heading_rad)])
-    return np.array([x_m, y_m]) + np.array([along + across, along - across, -along - across, -along + across])
 
 
 def can_open_window() -> bool:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import gymnasium
 import numpy as np
+from numpy.typing import NDArray
 
 from harness.config.toml_reading import nearest
 from harness.drivers.policy_file import ACTIONS
@@ -18,7 +19,8 @@ from harness.game.observation import observe
 from harness.game.outcome import Outcome
 from harness.game.roles import EGO
 from harness.game.seeding import generator_of, parts_of
-from harness.game.state import Bodies
+from harness.game.state import Bodies, State
+from harness.game.world import World
 from harness.road.scene.open_scene import OpenScene
 
 if TYPE_CHECKING:
@@ -128,22 +130,31 @@ class SingleGame:
     def info(self, player: int, step: Step | None = None) -> Info:
         """What the environments report of a player beside its observation."""
         state = self.arena.state if step is None else step.quantities.state
-        station_m = float(state.station_m[0, player])
-        payoff = self.arena.seats[player][0].payoff
-        outcome, terms = int(state.outcome[0, player]), dict[str, float]()
+        payoff, terms = self.arena.seats[player][0].payoff, dict[str, float]()
         if payoff is not None and step is None:
             terms = dict.fromkeys((*(each.name for each in payoff.terms), *payoff.fuzzy), 0.0)
         elif payoff is not None and step is not None:
             terms = {name: float(share[0]) + 0.0 for name, share in payoff.evaluate(step.quantities, player).items()}
-        return {
-            "outcome": outcome,
-            "is_success": outcome == Outcome.GOAL,
-            "terms": terms,
-            "station_m": station_m,
-            "goal_m": float(self.arena.world.road.routes.goal_m[player]) - station_m,
-            "speed_mps": float(state.speed_mps[0, player]),
-            "time_s": float(state.step[0]) * self.arena.world.step_s,
-        }
+        numbers = numbers_of(state, self.arena.world, player)
+        return {name: column[0].item() for name, column in numbers.items()} | {"terms": terms}
+
+
+def numbers_of(state: State, world: World, player: int) -> dict[str, NDArray[Any]]:
+    """[G] the numbers in the info of a player."""
+    outcome, station_m = state.outcome[:, player], state.station_m[:, player]
+    return {
+        "outcome": outcome.copy(),
+        "is_success": outcome == Outcome.GOAL,
+        "station_m": station_m.copy(),
+        "goal_m": world.road.routes.goal_m[player] - station_m,
+        "speed_mps": state.speed_mps[:, player].copy(),
+        "time_s": state.step * world.step_s,
+    }
+
+
+def space_of(size: int) -> gymnasium.spaces.Box:
+    """The space of observations or actions, of so many numbers from -1 to 1."""
+    return gymnasium.spaces.Box(-1.0, 1.0, (size,), np.float32)
 
 
 def _render_modes() -> list[str]:

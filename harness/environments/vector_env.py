@@ -5,25 +5,23 @@ Several arenas, in each of which the learner drives in another place of the scen
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import gymnasium
 import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
 
 from harness.drivers.policy_file import ACTIONS
 from harness.environments.arena import Arena, LiveSimulation
 from harness.environments.auto_reset import AutoReset
+from harness.environments.single_game import space_of
 from harness.game.arrays import FloatArray
 from harness.game.initial_state import StartDistribution
 from harness.game.observation_layout import SIZE
 from harness.game.outcome import Outcome
 
-OBSERVATION_SPACE = gymnasium.spaces.Box(-1.0, 1.0, (SIZE,), np.float32)
-ACTION_SPACE = gymnasium.spaces.Box(-1.0, 1.0, (ACTIONS,), np.float32)
+OBSERVATION_SPACE, ACTION_SPACE = space_of(SIZE), space_of(ACTIONS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,19 +36,9 @@ class Finished:
 
 
 class GamesVecEnv(LiveSimulation, VecEnv):
-    """Games of one learner, as Stable-Baselines3's `VecEnv`."""
+    """Games of one learner: what Stable-Baselines3's `VecEnv` asks for that has no meaning for them."""
 
     render_mode = None
-
-    @abstractmethod
-    def take_finished(self) -> list[Finished]:
-        """The games that ended since the last call, removed from the list."""
-
-    @abstractmethod
-    def reload(self, seed: int) -> None:
-        """Reload SUMO with a seed."""
-
-    # --- methods of VecEnv without a meaning for games ----------------------------------------------
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """The attribute, once for each game in `indices`."""
@@ -159,14 +147,8 @@ class ArenaVecEnv(GamesVecEnv):
         state = self.arena.state
         outcome = Outcome(int(state.outcome[game, self.learner]))
         took_part = state.present[game] | (state.outcome[game] != Outcome.RUNNING)  # a player at its goal has left
-        self._finished.append(
-            Finished(
-                payoff=float(self._payoff[game]),
-                steps=int(state.step[game]),
-                outcome=outcome,
-                alone=int(took_part.sum()) == 1,
-            )
-        )
+        payoff, steps, alone = float(self._payoff[game]), int(state.step[game]), int(took_part.sum()) == 1
+        self._finished.append(Finished(payoff=payoff, steps=steps, outcome=outcome, alone=alone))
         self._payoff[game] = 0.0
 
 
@@ -180,22 +162,18 @@ class JoinedVecEnv(GamesVecEnv):
         self._cuts = np.cumsum(games)[:-1]
 
     def reset(self) -> FloatArray:
-        """Reset every game. Returns observations [G, SIZE]."""
         return np.concatenate([each.reset() for each in self.environments])
 
     def step_async(self, actions: FloatArray) -> None:
-        """Store the learner's actions [G, 2] for `step_wait`."""
         for each, own in zip(self.environments, np.split(actions, self._cuts), strict=True):
             each.step_async(own)
 
     def step_wait(self) -> tuple[FloatArray, FloatArray, Any, list[dict[str, Any]]]:
-        """Play a step of every game, as `ArenaVecEnv.step_wait`."""
         steps = [each.step_wait() for each in self.environments]
         observation, payoff, done = (np.concatenate([step[part] for step in steps]) for part in range(3))
         return observation, payoff, done, [info for step in steps for info in step[3]]
 
     def take_finished(self) -> list[Finished]:
-        """The games that ended since the last call, removed from the lists."""
         return [game for each in self.environments for game in each.take_finished()]
 
     def reload(self, seed: int) -> None:
@@ -204,6 +182,5 @@ class JoinedVecEnv(GamesVecEnv):
             each.reload(seed)
 
     def close(self) -> None:
-        """Close the SUMO simulations."""
         for each in self.environments:
             each.close()

@@ -20,7 +20,7 @@ from harness.game.geometry import Box, box_distance
 from harness.game.junctions import SIGNALS, Signal
 from harness.game.outcome import Outcome
 from harness.game.quantities import Quantities
-from harness.game.state import NEAREST, NOTICED_M, Bodies, State
+from harness.game.state import NEAREST, NOTICED_M, Bodies, PlayersMotion, State
 from harness.game.traffic_rules import since_change_s
 from harness.game.world import World
 
@@ -184,7 +184,7 @@ class RecordedGame:
         return state
 
 
-_PLAYERS = ("x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad", "station_m", "lapsed")
+_PLAYERS = (*PlayersMotion._fields, "lapsed")
 _OUTCOMES = {outcome.word: outcome for outcome in Outcome}
 
 

@@ -25,6 +25,11 @@ class Box(NamedTuple):
     width_m: Any
 
 
+def boxes_of(boxes: Box) -> list[Box]:
+    """The boxes of a box with arrays [N], one by one."""
+    return [Box(*each) for each in np.array(boxes, dtype=float).T.tolist()]
+
+
 # --- two boxes -------------------------------------------------------------------------------------------------------
 
 

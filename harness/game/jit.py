@@ -41,7 +41,7 @@ def compiled(function: _Function) -> _Function:
     try:
         dispatcher: Any = numba.njit(cache=True, **options)(function)
         # `compile` reads the cache on disk first
-        dispatcher.compile = _in_turn(dispatcher.compile, Path(config.CACHE_DIR))
+        dispatcher.compile = _turn(Path(config.CACHE_DIR))(dispatcher.compile)
     except RuntimeError:  # numba found no writable folder
         dispatcher = numba.njit(**options)(function)
     finally:
@@ -65,18 +65,10 @@ class _Compilations(event.Listener):
 event.register("numba:compile", _Compilations())
 
 
-def _in_turn(work: Callable[..., object], folder: Path) -> Callable[..., object]:
-    def in_turn(*arguments: object) -> object:
-        with _turn(folder):
-            return work(*arguments)
-
-    return in_turn
-
-
 @contextlib.contextmanager
 def _turn(folder: Path) -> Iterator[None]:
     """Only this thread of this process compiles functions with this folder of the cache, and functions that they call,
-    in the block. The turn of a process that dies ends with it."""
+    in the block or the function that it decorates. The turn of a process that dies ends with it."""
     with contextlib.ExitStack() as stack:
         # a file system without locks is no error; a lock made of a file's existence would outlive its process
         with contextlib.suppress(OSError, NotImplementedError):

@@ -25,6 +25,14 @@ _DTYPES = {
 }
 
 
+_USUAL: Mapping[str, Any] = {
+    **{"crossing": True, "yields": False, "first_come": False, "across": False, "own_link": -1, "other_link": -1},
+    **dict.fromkeys(("right_m", "from_m"), -np.inf),
+    **dict.fromkeys(("left_m", "until_m"), np.inf),
+}
+"""A conflict without signals, in whatever lane the player is, with all of a stream that crosses its way."""
+
+
 class Signal(IntEnum):
     """State of a link of a traffic light."""
 
@@ -84,8 +92,9 @@ class Conflicts(NamedTuple):
 
     @classmethod
     def of(cls, rows: Sequence[Mapping[str, Any]]) -> Conflicts:
-        """The table of conflicts, each given by column."""
-        ordered = sorted(rows, key=lambda row: (row["player"], row["stream"], row["begin_m"]))
+        """The table of conflicts, each given by column, except where it has the usual value."""
+        whole = [{**_USUAL, **row} for row in rows]
+        ordered = sorted(whole, key=lambda row: (row["player"], row["stream"], row["begin_m"]))
         return cls(*(_column(name, [row[name] for row in ordered]) for name in cls._fields))
 
 

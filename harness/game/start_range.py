@@ -16,7 +16,7 @@ from math import atan2, hypot
 import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray
-from harness.game.geometry import Box, box_distance
+from harness.game.geometry import Box, box_distance, boxes_of
 from harness.game.road import Routes
 from harness.game.seeding import between
 
@@ -96,8 +96,8 @@ def draw_along_route(
     present: BoolArray,
     share: float,
     obstacles: Box | None = None,
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray] | None:
-    """x_m, y_m, heading_rad, speed_mps and station_m [P] of the centres of players of `length_m` [P].
+) -> FloatArray | None:
+    """[5, P] x_m, y_m, heading_rad, speed_mps and station_m of the centres of players of `length_m` [P].
 
     None in 1 - `share` of the games, and if `_ATTEMPTS` draws have no place for all that are `present` [P], apart from
     one another and from the `obstacles` [O]. A lane and a station are drawn uniformly, the speed uniformly from 0 to
@@ -109,8 +109,7 @@ def draw_along_route(
         drawn = [_draw(routes, each, (length_m[each], max_speed_mps[each]), generator) for each in range(len(length_m))]
         starts = np.array(drawn).T
         if _apart(starts[0], starts[1], length_m, present) and _clear(starts, length_m, present, obstacles):
-            x_m, y_m, heading_rad, speed_mps, station_m = starts
-            return x_m, y_m, heading_rad, speed_mps, station_m
+            return starts
     return None
 
 
@@ -143,7 +142,7 @@ def _apart(x_m: FloatArray, y_m: FloatArray, length_m: FloatArray, present: Bool
 
 def _clear(starts: FloatArray, length_m: FloatArray, present: BoolArray, obstacles: Box | None) -> bool:
     """Whether no obstacle stands on the way just before, beside or behind a player that is present."""
-    boxes = [] if obstacles is None else [Box(*each) for each in np.array(obstacles).T.tolist()]
+    boxes = [] if obstacles is None else boxes_of(obstacles)
     ways = [
         Box(x_m, y_m, heading_rad, own_m + 2.0 * _APART_M, _CLEAR_WIDTH_M)
         for x_m, y_m, heading_rad, own_m in zip(*starts[:3, present].tolist(), length_m[present].tolist(), strict=True)

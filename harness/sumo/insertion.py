@@ -13,11 +13,11 @@ import libsumo
 import numpy as np
 
 from harness.game.arrays import FloatArray
-from harness.game.geometry import Box, box_distance
+from harness.game.geometry import Box, box_distance, boxes_of
 from harness.game.initial_state import InitialState
 from harness.road.demand.route_file import SHARE, Departure, Motion
 from harness.road.demand.stops import Stop
-from harness.road.scene.open_obstacles import blockages, boxes_of
+from harness.road.scene.open_obstacles import blockages
 from harness.road.scene.open_scene import OpenScene
 from harness.road.xml.xml_file import number_of
 

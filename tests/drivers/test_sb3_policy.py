@@ -6,6 +6,7 @@ from __future__ import annotations
 import base64
 import pickle
 import zipfile
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,6 @@ import stable_baselines3
 import torch
 from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
-import harness
 from harness.config.driver import StableBaselines3
 from harness.drivers.external import find_driver
 from harness.drivers.sb3_policy import Sb3Driver
@@ -30,12 +30,7 @@ from tests.support.rollouts import arm, play
 torch.set_num_threads(1)  # tiny networks: more threads only wait for each other
 
 ALGORITHMS = ("PPO", "A2C", "SAC", "TD3", "DDPG", "TQC")
-WITH_BUFFER = {"learning_starts": 100, "batch_size": 16, "buffer_size": 500}
-SHORT: dict[str, dict[str, Any]] = {
-    "PPO": {"n_steps": 64, "batch_size": 32, "n_epochs": 1},
-    "A2C": {"n_steps": 16},
-    **dict.fromkeys(("SAC", "TD3", "DDPG", "TQC"), WITH_BUFFER),
-}
+SHORT: dict[str, dict[str, Any]] = {"PPO": {"n_steps": 64, "batch_size": 32, "n_epochs": 1}, "A2C": {"n_steps": 16}}
 
 
 def algorithm(name: str) -> Any:
@@ -51,18 +46,8 @@ NOISE = np.random.default_rng(4).standard_normal((20, 2))
 def saved(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """A saved model of each algorithm, trained for 128 steps on the harness's environment."""
     folder = tmp_path_factory.mktemp("saved")
-    assert harness.__version__  # importing the harness registers its environments
-    game = gymnasium.make("harness/Ego-v0", other="sumo")
-    try:
-        for name in ALGORITHMS:
-            model = algorithm(name)(
-                "MlpPolicy", game, seed=1, device="cpu", policy_kwargs={"net_arch": [16]}, **SHORT[name]
-            )
-            model.learn(128)
-            model.save(folder / f"{name}.zip")
-    finally:
-        game.close()
-    return {name: folder / f"{name}.zip" for name in ALGORITHMS}
+    with closing(gymnasium.make("harness:harness/Ego-v0", other="sumo")) as game:
+        return {name: save(name, "MlpPolicy", game, folder, steps=128, **SHORT.get(name, {})) for name in ALGORITHMS}
 
 
 def document(algorithm: str, **keys: Any) -> StableBaselines3:
@@ -154,7 +139,7 @@ def save(name: str, policy: str, env: Any, folder: Path, steps: int = 0, **more:
     """A file of an algorithm, trained for some steps."""
     small = {"policy_kwargs": {"net_arch": [8], **more.pop("policy_kwargs", {})}}
     if name in ("DQN", "QRDQN", "SAC", "TD3", "DDPG", "TQC"):
-        small |= {"buffer_size": 200, "learning_starts": 10_000}
+        small |= {"buffer_size": 500, "learning_starts": 100, "batch_size": 16}
     model = algorithm(name)(policy, env, device="cpu", seed=1, **small, **more)
     if steps:
         model.learn(steps)

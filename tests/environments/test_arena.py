@@ -16,11 +16,13 @@ from harness.config.toml_reading import read_document
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Step
 from harness.game.arrays import FloatArray, IntArray
+from harness.game.geometry import Box, boxes_of
 from harness.game.initial_state import InitialState
 from harness.game.observation_layout import LAYOUT, SIZE
 from harness.game.outcome import Outcome
 from harness.game.payoff import Payoff
 from harness.road.demand.route_file import Departure
+from harness.road.scene.open_obstacles import polygon_of
 from harness.road.scene.open_scene import OpenScene
 from tests.support.scenes import (
     CROSSING_EDGES,
@@ -38,11 +40,6 @@ from tests.support.scenes import (
 COAST = np.zeros((1, 2, 2))
 FLOW = '<flow id="f" type="van" begin="0" period="2" departLane="random"><route edges="{}"/></flow>'
 Open = Callable[..., Arena]
-
-
-@pytest.fixture(scope="module")
-def straight(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
-    return build_scene(tmp_path_factory.mktemp("scenes") / "straight")
 
 
 @pytest.fixture(scope="module")
@@ -72,15 +69,9 @@ def outcomes(arena: Arena) -> list[str]:
     return [Outcome(int(each)).word for each in arena.state.outcome[0]]
 
 
-def body(x: float, y: float, heading: float, length: float = 4.6, width: float = 1.8) -> shapely.Geometry:
-    box = shapely.box(-length / 2, -width / 2, length / 2, width / 2)
-    return shapely.affinity.translate(shapely.affinity.rotate(box, heading, (0, 0), use_radians=True), x, y)
-
-
 def bodies(step: Step) -> list[shapely.Geometry]:
-    state = step.quantities.state
-    poses = zip(state.x_m[0], state.y_m[0], state.heading_rad[0], strict=True)
-    return [body(*map(float, pose)) for pose in poses]
+    """All bodies of the first game."""
+    return [polygon_of(box) for box in boxes_of(Box(*(column[0] for column in step.quantities.bodies.boxes)))]
 
 
 def play_to_the_end(arena: Arena, action: FloatArray = COAST, steps: int = 200) -> list[Step]:
@@ -281,9 +272,8 @@ def test_background__contact_is_a_collision(straight: OpenScene, arena_of: Open)
     *before, last = play_to_the_end(arena, np.array([[[1.0, 0.0], [0.0, 0.0]]]))
     assert outcomes(arena) == ["collision", ""]
     for step, touches in ((before[-1], False), (last, True)):
-        found = step.quantities.bodies
-        van = body(*(float(each[0, 2]) for each in (found.x_m, found.y_m, found.heading_rad)), length=6.0, width=2.0)
-        assert shapely.intersects(bodies(step)[0], van) == touches
+        ego, _, van = bodies(step)
+        assert shapely.intersects(ego, van) == touches
 
 
 def test_background__is_reset_with_its_game(straight: OpenScene, arena_of: Open) -> None:

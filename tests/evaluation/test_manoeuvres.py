@@ -29,12 +29,6 @@ ENDING_Y, THROUGH_Y = -4.8, -1.6  # lanes of the merge; the right one ends at x 
 KINDS = {"car": BodyKind(length_m=LENGTH_M), "van": BodyKind(length_m=6.0, width_m=2.0)}
 
 
-@pytest.fixture(scope="module")
-def straight(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
-    """Two lanes of 300 m."""
-    return build_scene(tmp_path_factory.mktemp("scenes") / "straight")
-
-
 def car(
     name: str,
     x_m: float,

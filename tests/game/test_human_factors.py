@@ -29,12 +29,7 @@ from harness.game.observation_layout import LAYOUT, in_units
 from harness.game.world import World
 from harness.road.scene.open_scene import OpenScene
 from tests.support.moments import Moment, car, seen
-from tests.support.scenes import build_scene, drawn
-
-
-@pytest.fixture(scope="module")
-def straight(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
-    return build_scene(tmp_path_factory.mktemp("scenes") / "straight")
+from tests.support.scenes import drawn
 
 
 @pytest.fixture(scope="module")

@@ -169,11 +169,11 @@ def displace_in_sumo(monkeypatch: pytest.MonkeyPatch, far_m: float) -> None:
 
 
 def test_motion__a_player_that_sumo_displaces_is_an_error_row_with_step_and_distance(
-    road: OpenScene, monkeypatch: pytest.MonkeyPatch
+    straight: OpenScene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    unharmed = play(arm(road, Steady(), SumoDriver()), 4)
+    unharmed = play(arm(straight, Steady(), SumoDriver()), 4)
     displace_in_sumo(monkeypatch, 50.0)
-    games = play(arm(road, Steady(), SumoDriver()), 4)
+    games = play(arm(straight, Steady(), SumoDriver()), 4)
     assert records(games[::2]) == records(unharmed[::2])
     for game in games[1::2]:
         found = re.match(
@@ -257,13 +257,7 @@ def test_observation__of_a_reset_is_checked_too(merge: OpenScene, monkeypatch: p
 # --- every term can be computed in every scene ------------------------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def road(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
-    """A minimal scene: one straight road and the two players."""
-    return build_scene(tmp_path_factory.mktemp("road"))
-
-
-@pytest.fixture(scope="module", params=["road", "merge"])
+@pytest.fixture(scope="module", params=["straight", "merge"])
 def everywhere(request: pytest.FixtureRequest) -> Quantities:
     """Games with both players at each station of their routes: at rest and at top speed, on the route's line, beside
     the road and turned round. In the last games the non-ego is not present."""

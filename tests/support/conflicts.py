@@ -20,20 +20,13 @@ CROSSING: Mapping[str, Any] = {
     "stream": 0,
     "begin_m": 98.5,
     "end_m": 101.5,
-    "crossing": True,
     "yields": True,
-    "first_come": False,
     "stop_m": 90.0,
     "wait_m": 90.0,
-    "right_m": -np.inf,
-    "left_m": np.inf,
     "own_link": 0,
     "other_link": 1,
-    "from_m": -np.inf,
-    "until_m": np.inf,
     "zone_m": 7.0,
     "length_m": 3.0,
-    "across": False,
 }
 
 

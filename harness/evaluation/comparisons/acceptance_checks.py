@@ -3,14 +3,7 @@
 A bound is compared with the unfavourable end of a 95 % interval, not with the measured value: 0 failures in 10 games
 are compatible with a failure rate of 31 %, and don't show that it is below 10 %.
 
-| bound | measured in | interval |
-| --- | --- | --- |
-| `failure_rate` | every arm of the judged ego against the persona, of any round | Clopper-Pearson |
-| `failure_rate_alone` | the arm of the judged ego without the non-ego | Clopper-Pearson |
-| `preventable_failure_rate` | the same arms: failures a reference driver prevents from the start | Clopper-Pearson |
-| `near_miss_rate` | the same arms as `failure_rate`, by the column `near_miss` | Clopper-Pearson |
-| `speed_loss_mps` | games of the judged and the naive ego with the same start against the persona | paired t |
-| `gap_share` | the best-response gap of the judged ego (`gaps.csv`) | paired t |
+docs/acceptance.md says in which games each bound is measured, and by which interval.
 """
 
 from __future__ import annotations
@@ -111,7 +104,7 @@ def judge(
 ) -> list[Check]:
     """Every bound for every persona and training seed: one check for each arm that it is measured in.
 
-    `bounds` are the bounds of the table above with their values. A bound that can't be measured has a check with NaN,
+    `bounds` are those of docs/acceptance.md with their values. A bound that can't be measured has a check with NaN,
     which does not pass; so has every bound about players of which one can't drive the scene.
     """
     checks = []

@@ -1,14 +1,8 @@
 """Which failures of the ego a reference driver would have prevented: the tables, their counts, and the sentence.
 
-Two verdicts are kept apart, because they answer different questions and agree in few games:
-
-| verdict | question |
-| --- | --- |
-| from the conflict on | once the danger is there, could a driver still have prevented it? |
-| driven so from the start | does a driver who drives so get into it at all? |
-
-From the conflict on, the reference driver takes over the recorded game when its own rule says danger, and the others
-repeat their recorded course. From the start, it plays the same seeded game from its first step, and the others react.
+Two verdicts are kept apart (docs/preventability.md). From the conflict on, the reference driver takes over the recorded
+game when its own rule says danger, and the others repeat their recorded course. From the start, it plays the same
+seeded game from its first step, and the others react.
 
 A cell is empty where the verdict does not exist: a contact with a rail and a timeout have no conflict to take over at,
 and a game may fail to be played.

@@ -111,24 +111,17 @@ def _cut(root: ElementTree.Element, kept: set[str]) -> Iterator[ElementTree.Elem
 
     links = [link for link in root.findall("connection") if is_kept(link)]
     signals = {link.get("tl") for link in links}
+    keeps: dict[str, Callable[[ElementTree.Element], bool]] = {
+        "junction": lambda junction: junction.get("id", "") in kept or junction.get("id", "").startswith(":"),
+        "connection": is_kept,
+        "tlLogic": lambda logic: logic.get("id") in signals,
+        "roundabout": lambda ring: set(ring.get("nodes", "").split()) <= kept,
+    }
     for element in root:
-        name = element.get("id", "")
-        if element.tag == "junction":
-            if name in kept or name.startswith(":"):
-                yield element
-            elif name in outer:
-                yield _dead_end(element, ends)
-        elif element.tag == "connection":
-            if is_kept(element):
-                yield element
-        elif element.tag == "tlLogic":
-            if name in signals:
-                yield element
-        elif element.tag == "roundabout":
-            if set(element.get("nodes", "").split()) <= kept:
-                yield element
-        else:
+        if element.tag not in keeps or keeps[element.tag](element):
             yield element
+        elif element.tag == "junction" and element.get("id") in outer:
+            yield _dead_end(element, ends)
 
 
 def _junction_of(inside: str) -> str:

@@ -147,20 +147,11 @@ def _row(player: int, stream: int, zone: _Zone, *, yields: bool, before_m: float
         "stream": stream,
         "begin_m": zone.own_m,
         "end_m": zone.own_end_m,
-        "crossing": True,
         "yields": yields,
-        "first_come": False,
         "stop_m": zone.own_m - before_m,
         "wait_m": zone.own_m - before_m,
-        "right_m": -np.inf,
-        "left_m": np.inf,
-        "own_link": -1,
-        "other_link": -1,
-        "from_m": -np.inf,
-        "until_m": np.inf,
         "zone_m": zone.other_m,
         "length_m": zone.other_end_m - zone.other_m,
-        "across": False,
     }
 
 

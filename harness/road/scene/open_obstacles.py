@@ -65,11 +65,6 @@ def open_obstacles(files: SceneFiles, area: BaseGeometry, ways: Sequence[Route])
     return Obstacles(each=tuple(found), outlines=tuple(outlines))
 
 
-def boxes_of(boxes: Box) -> list[Box]:
-    """The boxes of a box with arrays [N], one by one."""
-    return [Box(*each) for each in np.array(boxes, dtype=float).T.tolist()]
-
-
 def polygon_of(box: Box) -> shapely.Polygon:
     """A box as a polygon."""
     along = 0.5 * box.length_m * np.array([np.cos(box.heading_rad), np.sin(box.heading_rad)])

@@ -147,13 +147,6 @@ def _vehicle(file: Path, role: str, player: Player, routes: RouteFile) -> Depart
 def actuator_limits(document: Scene, types: Sequence[VehicleType]) -> ActuatorLimits:
     """What the players' bodies can do, [P]; `types` are those of their vehicles."""
     limits = [player.actuators.with_defaults_of(player.kind) for player in document.players]
-    return ActuatorLimits(
-        max_acceleration_mps2=np.array([each.max_acceleration_mps2 for each in limits]),
-        max_braking_mps2=np.array([each.max_braking_mps2 for each in limits]),
-        max_speed_mps=np.array([each.max_speed_mps for each in types]),
-        max_steering_rad=np.array([each.max_steering_rad for each in limits]),
-        max_steering_rate_radps=np.array([each.max_steering_rate_radps for each in limits]),
-        wheelbase_m=np.array([each.wheelbase_m for each in limits]),
-        max_lateral_mps2=np.array([each.max_lateral_mps2 for each in limits]),
-        friction=document.friction,
-    )
+    columns = {name: np.array([getattr(each, name) for each in limits]) for name in type(limits[0]).model_fields}
+    max_speed_mps = np.array([each.max_speed_mps for each in types])
+    return ActuatorLimits(**columns, max_speed_mps=max_speed_mps, friction=document.friction)

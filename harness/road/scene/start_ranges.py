@@ -11,14 +11,13 @@ import numpy as np
 from sumolib.net.lane import Lane
 
 from harness.errors import UsageError
-from harness.game.geometry import Box, box_distance
+from harness.game.geometry import Box, box_distance, boxes_of
 from harness.game.initial_state import StartDistribution, draw_initial_state
 from harness.game.road import SPACING_M, Route
 from harness.game.start_range import ArrivesAfterEgo, BesideEgo, OnLine, StartRange
 from harness.game.world import World
 from harness.road.net import network
 from harness.road.net.route_table import meeting, route_points
-from harness.road.scene.open_obstacles import boxes_of
 from harness.road.scene.scene_files import SceneFiles
 
 _DRAWS = 200
