@@ -12,7 +12,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from pydantic import TypeAdapter, ValidationError
 
 from harness.campaign.plan.plan import plan
@@ -25,6 +24,7 @@ from harness.config.toml_reading import read_document
 from harness.errors import Problem, UsageError
 from harness.files import write_atomically
 from harness.game.payoff_terms import FUZZY_QUANTITIES, TERMS
+from harness.reports.page_template import environment_of
 from harness.shipped_documents import shipped
 
 if sys.version_info >= (3, 11):
@@ -68,16 +68,9 @@ def check_name(name: str, kind: Literal["campaign", "persona", "scene"]) -> None
 
 def rendered(template: str, *, in_xml: bool = False, **values: object) -> str:
     """The text of a template of this room with values, which the filter `toml` writes in TOML."""
-    environment = Environment(
-        loader=PackageLoader("harness", "cli"),
-        undefined=StrictUndefined,
-        keep_trailing_newline=True,
-        autoescape=in_xml,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    environment = environment_of("cli", autoescape=in_xml)
     environment.filters["toml"] = toml
-    return environment.get_template(template).render(values)
+    return environment.get_template(template).render(values) + "\n"
 
 
 def toml(value: Any) -> str:

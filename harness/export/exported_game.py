@@ -8,7 +8,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 import pandas as pd
@@ -16,7 +15,7 @@ import shapely
 
 from harness.game.arrays import FloatArray
 from harness.replay.scenery import changes_of_signals
-from harness.replay.vehicles import DrawnVehicle, types_of_vehicles
+from harness.replay.vehicles import DrawnVehicle, presences, types_of_vehicles
 from harness.road.scene.open_scene import OpenScene
 
 VEHICLE, PERSON, THING = "vehicle", "person", "thing"
@@ -160,7 +159,7 @@ def _bodies(
     for name, rows in sorted(by_name.items(), key=lambda each: (order.get(each[0], len(order)), each[1]["step"].min())):
         drawn, kind = types[name], kind_of_shape(types[name].shape)
         wheelbase_m = wheelbases_m.get(name, WHEELBASE_SHARE * drawn.length_m)
-        for piece in _pieces(rows):
+        for piece in presences(rows):
             yield Body(
                 name=name,
                 original=name,
@@ -177,13 +176,6 @@ def _bodies(
                     for column in ("time_s", "x_m", "y_m", "speed_mps", "acceleration_mps2")
                 },
             )
-
-
-def _pieces(rows: pd.DataFrame) -> Iterator[pd.DataFrame]:
-    """A road user's rows, split where it was absent."""
-    cuts = np.flatnonzero(np.diff(rows["step"].to_numpy()) > 1) + 1
-    for first, end in pairwise([0, *cuts.tolist(), len(rows)]):
-        yield rows.iloc[first:end]
 
 
 def _buildings(outlines: Sequence[FloatArray], end_s: float) -> Iterator[Body]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles, PlacedObstacle
@@ -85,6 +87,13 @@ def legend(trace: pd.DataFrame, names: Mapping[str, str]) -> str:
     """Which vehicle is whose, by its colour."""
     present = [name for name in PLAYER_COLOURS if (trace["player"] == name).any()]
     return ", ".join(f"{_COLOUR_NAMES[name]}: {shown_name(name, names)}" for name in present)
+
+
+def presences(rows: pd.DataFrame) -> Iterator[pd.DataFrame]:
+    """A road user's rows, split where it was absent."""
+    cuts = np.flatnonzero(np.diff(rows["step"].to_numpy()) > 1) + 1
+    for first, end in pairwise([0, *cuts.tolist(), len(rows)]):
+        yield rows.iloc[first:end]
 
 
 def types_of_vehicles(

@@ -32,14 +32,15 @@ LIBRARIES = ("vendor/uPlot.iife.min.js", "vendor/dataTables.min.js")
 """Libraries that the page contains as they are published; their licences are beside them."""
 
 
-def environment_of(*folders: str) -> Environment:
+def environment_of(*folders: str, autoescape: bool = True) -> Environment:
     """The template environment of folders of the package `harness`; the first that has a template provides it.
 
-    Templates write numbers with the functions of `harness.reports.numbers`, which are filters.
+    Templates write numbers with the functions of `harness.reports.numbers`, which are filters. `autoescape` is for
+    HTML and XML.
     """
     environment = Environment(
         loader=ChoiceLoader([PackageLoader("harness", folder) for folder in folders]),
-        autoescape=True,
+        autoescape=autoescape,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

@@ -11,7 +11,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import pandas as pd
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage, Trained
@@ -27,6 +26,7 @@ from harness.game.payoff_terms import GROUPS, TERMS
 from harness.game.roles import NON_EGO, ROLES
 from harness.reports.learning import stopped
 from harness.reports.numbers import MISSING, interval, number, percent
+from harness.reports.page_template import environment_of
 from harness.reports.persona.profile import PersonaProfile, persona_profile
 
 CARD = "README.md"
@@ -50,16 +50,13 @@ def model_card(stage: str, manifest: Mapping[str, Any], summary: pd.DataFrame, p
     persona = Persona.from_record(document)
     profile = persona_profile(persona)
     versions = manifest["versions"]
-    environment = Environment(
-        loader=PackageLoader("harness", "campaign/results"),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    environment = environment_of("campaign/results", autoescape=False)
     environment.filters["one_line"] = _one_line
     text = environment.get_template("model_card.md.jinja").render(
         stage=stage,
-        intro=_intro(entry, policy["against"], is_ego),
+        is_ego=is_ego,
+        entry=entry,
+        policy=policy,
         campaign=manifest["name"],
         version=versions["harness"],
         quick=manifest["quick"],
@@ -70,15 +67,7 @@ def model_card(stage: str, manifest: Mapping[str, Any], summary: pd.DataFrame, p
         terms=list(_terms(profile)),
         attends=[*profile.attends, profile.decides],
         sources=persona.sources,
-        seed=entry["seed"],
-        intervals="Clopper-Pearson of rates" + (", t of speeds" if is_ego else ""),
-        headings=_HEADINGS[is_ego],
         figures=list(_figures(stage, manifest, summary, is_ego)),
-        purpose="as the ego under study, or for comparison with another ego"
-        if is_ego
-        else f"to test an ego against a driver with the persona `{persona.name}`",
-        scene=policy["scene"],
-        snippet=_snippet(stage, entry, is_ego),
         settings=[(name, _shown(value)) for name, value in policy["training"].items()],
         versions=", ".join(f"{name} {versions[name]}" for name in _PROGRAMS if name in versions),
     )
@@ -88,16 +77,6 @@ def model_card(stage: str, manifest: Mapping[str, Any], summary: pd.DataFrame, p
 def _one_line(text: str) -> str:
     """A text of a document as one line of plain text, without Markdown headings, tables or HTML elements."""
     return " ".join(text.split()).replace("&", "&amp;").replace("<", "&lt;").replace("|", "\\|")
-
-
-def _intro(entry: Mapping[str, Any], against: str | None, is_ego: bool) -> str:
-    if not is_ego:
-        return f"A non-ego: a selfish driver with the persona `{entry['persona']}`."
-    if entry["persona"]:
-        return f"The ego, retrained against the persona `{entry['persona']}`."
-    if against is not None:
-        return "The naive ego: it was trained alone on the road, and beside SUMO's own driver."
-    return "The naive ego: it was trained alone on the road."
 
 
 def _facts(
@@ -158,12 +137,6 @@ def _terms(profile: PersonaProfile) -> Iterator[Mapping[str, str]]:
         yield {**row, "weight": f"{fuzzy.weight:g}"}
 
 
-_HEADINGS = {
-    True: ("games", "failure rate", "mean speed (m/s)"),
-    False: ("games", "reaches its goal", "mean speed (m/s)"),
-}
-
-
 def _figures(
     stage: str, manifest: Mapping[str, Any], summary: pd.DataFrame, is_ego: bool
 ) -> Iterator[tuple[str, Sequence[str]]]:
@@ -192,17 +165,6 @@ def _with(value: str, span: str) -> str:
     if value == MISSING:
         return ""
     return value if span == MISSING else f"{value} ({span})"
-
-
-def _snippet(stage: str, entry: Mapping[str, Any], is_ego: bool) -> str:
-    if is_ego:
-        return f'[ego]\ndriver = "policies/{stage}"    # the path of this folder'
-    return f"""personas = ["personas/{entry["persona"]}.toml"]
-seeds = [{entry["seed"]}]
-policies = "policies"    # the path of the parent of this folder
-
-[ego]
-driver = "sumo"          # or the folder of a policy: your own"""
 
 
 def _shown(value: Any) -> str:

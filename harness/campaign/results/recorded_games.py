@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,7 @@ from harness.game.arrays import FloatArray
 from harness.game.sight import TALL_WIDTH_M
 from harness.replay import choose_games
 from harness.replay.contacts import contacts
-from harness.replay.vehicles import DrawnVehicle, types_of_vehicles
+from harness.replay.vehicles import DrawnVehicle, presences, types_of_vehicles
 from harness.reports.embedding import BACKGROUND_COLUMNS, COLUMNS, GameTracks, Track
 from harness.road.net.network import read_net
 from harness.road.scene import drawing
@@ -91,7 +90,9 @@ def tracks_of(trace: pd.DataFrame, scene: OpenScene, game: Any) -> GameTracks:
         outcome=judged(game._asdict())[1],
         players=players,
         background=[
-            _track(name, piece, types[name], of_background) for name, rows in by_name.items() for piece in _pieces(rows)
+            _track(name, piece, types[name], of_background)
+            for name, rows in by_name.items()
+            for piece in presences(rows)
         ],
         touches=[(contact.time_s, contact.x_m, contact.y_m) for contact in contacts(trace, types, scene.rail_lines)],
     )
@@ -104,14 +105,6 @@ def _track(name: str, rows: pd.DataFrame, drawn: DrawnVehicle, columns: Sequence
         first_step=int(rows["step"].iloc[0]),
         columns={column: rows[column].to_numpy(float) for column in columns},
     )
-
-
-def _pieces(rows: pd.DataFrame) -> Iterator[pd.DataFrame]:
-    """A road user's rows, split where it was absent."""
-    cuts = np.flatnonzero(np.diff(rows["step"].to_numpy()) > 1) + 1
-    edges = [0, *cuts.tolist(), len(rows)]
-    for first, end in pairwise(edges):
-        yield rows.iloc[first:end]
 
 
 def scene_drawing(scene: OpenScene) -> dict[str, Any]:

@@ -22,20 +22,18 @@ class InUse(Exception):
 @contextlib.contextmanager
 def only_one(file: Path) -> Iterator[None]:
     """Hold a lock during the block. Raises InUse, at once, if another process holds it."""
-    lock, owner = _lock(file), file.with_name(f"{file.name}.owner")
-    try:
-        _acquire(lock)
-    except Timeout:
-        name = ""
-        with contextlib.suppress(OSError, UnicodeDecodeError):
-            name = owner.read_text(encoding="utf-8")[:200].strip()
-        raise InUse(name or "another process") from None
-    try:
+    owner = file.with_name(f"{file.name}.owner")
+    with contextlib.ExitStack() as stack:
+        try:
+            stack.enter_context(_held(file))
+        except Timeout:
+            name = ""
+            with contextlib.suppress(OSError, UnicodeDecodeError):
+                name = owner.read_text(encoding="utf-8")[:200].strip()
+            raise InUse(name or "another process") from None
+        stack.callback(owner.unlink, missing_ok=True)
         owner.write_text(f"process {os.getpid()}", encoding="utf-8")
         yield
-    finally:
-        owner.unlink(missing_ok=True)
-        lock.release()
 
 
 @contextlib.contextmanager
@@ -45,28 +43,23 @@ def held_by_worker(folder: Path, name: str, timeout_s: float) -> Iterator[None]:
     At most one process at a time has a name. Raises StageFailed if another one still has it after `timeout_s`.
     """
     folder.mkdir(exist_ok=True)
-    lock = _lock(folder / f"{name}.lock")
-    try:
-        _acquire(lock, timeout_s)
-    except Timeout:
-        raise StageFailed(f"{name}: a process that was lost still has its lock, after {timeout_s:g} s") from None
-    try:
+    with contextlib.ExitStack() as stack:
+        try:
+            stack.enter_context(_held(folder / f"{name}.lock", timeout_s))
+        except Timeout:
+            raise StageFailed(f"{name}: a process that was lost still has its lock, after {timeout_s:g} s") from None
         yield
-    finally:
-        lock.release()
 
 
 def is_held(file: Path) -> bool:
     """Whether a process has a lock, as far as this machine can see."""
-    lock = _lock(file)
     try:
-        lock.acquire(timeout=0.0)
+        with _held(file):
+            return False
     except Timeout:
         return True
-    except (OSError, NotImplementedError):
+    except OSError:
         return False
-    lock.release()
-    return False
 
 
 def wait_for_workers(folder: Path, timeout_s: float) -> None:
@@ -74,19 +67,19 @@ def wait_for_workers(folder: Path, timeout_s: float) -> None:
     until = time.monotonic() + timeout_s
     for file in sorted(folder.glob(_LOCK)):
         try:
-            lock = _lock(file)
-            _acquire(lock, timeout_s=max(until - time.monotonic(), 0.0))
-            file.unlink(missing_ok=True)
-            lock.release()
+            with _held(file, max(until - time.monotonic(), 0.0)):
+                file.unlink(missing_ok=True)
         except Timeout:
             raise InUse("a worker of an earlier command") from None
 
 
-def _lock(file: Path) -> FileLock:
-    return FileLock(file, fallback_to_soft=False)  # a soft lock would outlive a process that is killed
-
-
-def _acquire(lock: FileLock, timeout_s: float = 0.0) -> None:
+@contextlib.contextmanager
+def _held(file: Path, timeout_s: float = 0.0) -> Iterator[None]:
     """Raises Timeout if another process holds the lock. On a file system without locks it is always free."""
+    lock = FileLock(file, fallback_to_soft=False)  # a soft lock would outlive a process that is killed
     with contextlib.suppress(NotImplementedError):
         lock.acquire(timeout=timeout_s)
+    try:
+        yield
+    finally:
+        lock.release()
