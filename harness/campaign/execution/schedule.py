@@ -5,19 +5,33 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
+from typing import Generic, Protocol, TypeVar
 
-from harness.campaign.plan.stages import Stage
 from harness.errors import PlanError
 
 
-class Schedule:
+class Schedulable(Protocol):
+    """What a schedule knows of a stage."""
+
+    @property
+    def id(self) -> str: ...
+    @property
+    def seed(self) -> int: ...
+    @property
+    def needs(self) -> Sequence[str]: ...
+
+
+StageT = TypeVar("StageT", bound=Schedulable)
+
+
+class Schedule(Generic[StageT]):
     """The stages that are left, each handed out when everything that it needs is done.
 
     Of the stages that are ready, those of the campaign's first seeds come first, so that a seed's results are there
     early; within a seed the one with the longest chain of stages behind it, so that the chain is not what ends last.
     """
 
-    def __init__(self, stages: Sequence[Stage], finished: Iterable[str]) -> None:
+    def __init__(self, stages: Sequence[StageT], finished: Iterable[str]) -> None:
         """Raises PlanError where a stage needs an id that is neither planned nor finished, or needs are circular."""
         finished = set(finished)
         self._stages = {stage.id: stage for stage in stages if stage.id not in finished}
@@ -39,11 +53,11 @@ class Schedule:
         self._failed: set[str] = set()
         self._collect_ready()
 
-    def take(self) -> Stage | None:
+    def take(self) -> StageT | None:
         """The next stage to carry out; None if none is ready."""
         return self._stages[self._ready.pop(0)] if self._ready else None
 
-    def put_back(self, stage: Stage) -> None:
+    def put_back(self, stage: StageT) -> None:
         """A stage that was taken is to be carried out again, before any other."""
         self._ready.insert(0, stage.id)
 
@@ -68,7 +82,9 @@ class Schedule:
         self._ready.sort(key=self._priorities.__getitem__)
 
 
-def _priorities(stages: Sequence[Stage], needed_by: Mapping[str, Sequence[str]]) -> dict[str, tuple[int, int, int]]:
+def _priorities(
+    stages: Sequence[Schedulable], needed_by: Mapping[str, Sequence[str]]
+) -> dict[str, tuple[int, int, int]]:
     """Of each stage: the place of its seed, the length of the chain behind it (longer first), its place in the plan."""
 
     @cache

@@ -24,7 +24,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Generic, TypeVar
 
 from harness.campaign.plan.alone_bounds import alone_bounds
 from harness.campaign.plan.stages import (
@@ -57,23 +56,13 @@ from harness.evaluation.strategies import (
 )
 from harness.game.roles import EGO, NON_EGO
 
-StrategyT = TypeVar("StrategyT", bound=EgoStrategy | PersonaNonEgo)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Planned(Generic[StrategyT]):
-    """A strategy of a campaign, and the gates before its training."""
-
-    strategy: StrategyT
-    gates: tuple[EquilibriumGate, ...] = ()
-
 
 @dataclass(frozen=True, kw_only=True)
 class PersonaRounds:
     """All strategies of one persona's rounds, for one seed, and the stages of the rounds after the paper's."""
 
-    egos: list[Planned[EgoStrategy]]
-    non_egos: list[Planned[PersonaNonEgo]]
+    egos: list[EgoStrategy]
+    non_egos: list[PersonaNonEgo]
     stages: list[Stage]
 
 
@@ -81,66 +70,53 @@ def persona_rounds(of: SeedStages, persona: str, tunable: bool = False) -> Perso
     """All rounds of a persona. The stages of rounds 0 to 2 are those of `paper_rounds`."""
     campaign = of.campaign
     gates: tuple[EquilibriumGate, ...] = ()
-    egos = [Planned[EgoStrategy](strategy=NaiveEgo())]
-    non_egos = [Planned(strategy=PersonaNonEgo(persona=persona))]
+    egos: list[EgoStrategy] = [NaiveEgo()]
+    non_egos = [PersonaNonEgo(persona=persona)]
     stages: list[Stage] = []
     rounds = PersonaRounds(egos=egos, non_egos=non_egos, stages=stages)
     if not ego_learns(campaign):
-        egos.extend([Planned(strategy=ReconfiguredEgo(against=persona))] if tunable else [])
+        egos.extend([ReconfiguredEgo(against=persona)] if tunable else [])
         return rounds
     iterates = not campaign.rounds.personas or persona in campaign.rounds.personas
     last = campaign.rounds.count if iterates else PAPER_ROUNDS
     for round_ in range(PAPER_ROUNDS, last + 1):
         learner_is_ego = round_ % 2 == 0
         if learner_is_ego:
-            egos.append(Planned(strategy=RetrainedEgo(against=persona, round=round_), gates=gates))
+            egos.append(RetrainedEgo(against=persona, round=round_))
         else:
-            non_egos.append(Planned(strategy=PersonaNonEgo(persona=persona, round=round_), gates=gates))
+            non_egos.append(PersonaNonEgo(persona=persona, round=round_))
+        of.gates[egos[-1] if learner_is_ego else non_egos[-1]] = gates
         if round_ > PAPER_ROUNDS:
             stages.extend(_plan_round(of, rounds, ego_learns=learner_is_ego))
         if campaign.stops_early and learner_is_ego and round_ < last:
-            pair = pairing(of, egos[-1], non_egos[-1])
+            pair = of.pair(egos[-1], non_egos[-1])
             stages.extend(plan_best_responses(campaign, pair))
             gates = (*gates, gate_of(campaign, pair))
     return rounds
 
 
-def pairing(of: SeedStages, ego: Planned[EgoStrategy], non_ego: Planned[PersonaNonEgo]) -> AssessmentStage:
-    """The assessment of an ego strategy against a non-ego strategy."""
-    # In the rounds of one persona a later strategy has the gates of the earlier ones; across personas each has its own.
-    persona = non_ego.strategy.persona
-    same = isinstance(ego.strategy, RetrainedEgo) and ego.strategy.against == persona
-    gates = max(ego.gates, non_ego.gates, key=len) if same else (*ego.gates, *non_ego.gates)
-    return of.assessment(Arm(ego=ego.strategy, non_ego=non_ego.strategy), persona=persona, gates=gates)
-
-
 def _plan_round(of: SeedStages, rounds: PersonaRounds, *, ego_learns: bool) -> list[Stage]:
     """Train the latest strategy of a player, and assess it against the other player's latest and alone."""
     egos, non_egos = rounds.egos, rounds.non_egos
-    persona = non_egos[0].strategy.persona
+    persona = non_egos[0].persona
     strategy: EgoStrategy | PersonaNonEgo
     if ego_learns:
-        strategy, gates, alone = egos[-1].strategy, egos[-1].gates, Arm(ego=egos[-1].strategy)
-        others = [of.side(each.strategy) for each in non_egos]
+        strategy, alone, others = egos[-1], Arm(ego=egos[-1]), [of.side(each) for each in non_egos]
         before = egos[:-1], non_egos
     else:
-        strategy, gates, alone = non_egos[-1].strategy, non_egos[-1].gates, Arm(non_ego=non_egos[-1].strategy)
-        others = [of.side(each.strategy) for each in egos]
+        strategy, alone, others = non_egos[-1], Arm(non_ego=non_egos[-1]), [of.side(each) for each in egos]
         before = egos, non_egos[:-1]
     opponent, weighing = _opponent(of, others, *before)
     return [
         *weighing,
-        of.training(strategy, opponent, persona=persona, gates=gates),
-        pairing(of, egos[-1], non_egos[-1]),
-        of.assessment(alone, persona=persona, gates=gates),
+        of.training(strategy, opponent, persona=persona),
+        of.pair(egos[-1], non_egos[-1]),
+        of.assessment(alone, persona=persona),
     ]
 
 
 def _opponent(
-    of: SeedStages,
-    others: Sequence[Side],
-    egos: Sequence[Planned[EgoStrategy]],
-    non_egos: Sequence[Planned[PersonaNonEgo]],
+    of: SeedStages, others: Sequence[Side], egos: Sequence[EgoStrategy], non_egos: Sequence[PersonaNonEgo]
 ) -> tuple[Side, list[AssessmentStage]]:
     """The opponent in a training, one or several of the sides `others`; and the assessments by which it is weighed, if
     it is: those of `egos` against `non_egos`."""
@@ -150,7 +126,7 @@ def _opponent(
     members = tuple(member for side in others for member in members_of(*side))
     if against == "all":
         return (FixedMixture(members=members, shares=(1.0,) * len(members)),), []
-    arms = [[pairing(of, ego, non_ego) for non_ego in non_egos] for ego in egos]
+    arms = [[of.pair(ego, non_ego) for non_ego in non_egos] for ego in egos]
     ids = tuple(tuple(arm.id for arm in row) for row in arms)
     return (EquilibriumMixture(members=members, arms=ids),), [arm for row in arms for arm in row]
 

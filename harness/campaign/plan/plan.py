@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from harness.campaign.plan.iterated_rounds import PersonaRounds, Planned, pairing, persona_rounds, plan_best_responses
+from harness.campaign.plan.iterated_rounds import PersonaRounds, persona_rounds, plan_best_responses
 from harness.campaign.plan.paper_rounds import plan_paper_rounds, plan_robust, plan_searches
 from harness.campaign.plan.stages import AssessmentStage, PreventabilityStage, Stage, TrainingStage
 from harness.campaign.plan.strategy_stages import SeedStages, crossplay_name, ego_learns
@@ -44,7 +44,7 @@ def _plan_responses(of: SeedStages, rounds: Sequence[PersonaRounds], stages: Ite
     """Best responses in the last pair of each persona's rounds, and in the arms that the campaign names."""
     if of.campaign.best_response is None:
         return []
-    last = [pairing(of, each.egos[-1], each.non_egos[-1]).name for each in rounds]
+    last = [of.pair(each.egos[-1], each.non_egos[-1]).name for each in rounds]
     assessments = {stage.name: stage for stage in stages if isinstance(stage, AssessmentStage)}
     names = dict.fromkeys((*last, *of.campaign.best_response.arms))
     pairs = [assessments[name] for name in names if name in assessments and assessments[name].is_pair]
@@ -66,18 +66,17 @@ def _plan_preventability(campaign: Campaign, stages: Iterable[Stage]) -> list[Pr
 def _plan_crossplay(of: SeedStages, rounds: Sequence[PersonaRounds]) -> list[AssessmentStage]:
     if of.campaign.crossplay is None:
         return []
-    egos = {ego.strategy: ego for each in rounds for ego in each.egos}
-    egos |= {ego.strategy: ego for ego in _egos_of_no_persona(of.campaign, has_round_2=len(egos) > 1)}
+    egos = dict.fromkeys(ego for each in rounds for ego in each.egos)
+    egos |= dict.fromkeys(_egos_of_no_persona(of.campaign, has_round_2=len(egos) > 1))
     non_egos = [non_ego for each in rounds for non_ego in each.non_egos]
-    return [pairing(of, ego, non_ego) for ego in egos.values() for non_ego in non_egos]
+    return [of.pair(ego, non_ego) for ego in egos for non_ego in non_egos]
 
 
-def _egos_of_no_persona(campaign: Campaign, has_round_2: bool) -> list[Planned[EgoStrategy]]:
+def _egos_of_no_persona(campaign: Campaign, has_round_2: bool) -> list[EgoStrategy]:
     """The egos that belong to no single persona: of populations, of several personas, or from outside."""
     round_2 = RetrainedEgo if ego_learns(campaign) else ReconfiguredEgo
     strategies: list[EgoStrategy] = []
     strategies += [round_2(against=each) for each in campaign.mixed_people] if has_round_2 else []
     strategies += [RobustEgo()] if ego_learns(campaign) and campaign.retraining.against else []
     written = campaign.crossplay.egos if campaign.crossplay is not None else []
-    strategies += [OtherEgo(driver=crossplay_name(each)) for each in written]
-    return [Planned[EgoStrategy](strategy=each) for each in strategies]
+    return strategies + [OtherEgo(driver=crossplay_name(each)) for each in written]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import PurePath
 
 from harness.campaign.plan.stages import (
@@ -34,6 +35,7 @@ from harness.evaluation.strategies import (
     OtherEgo,
     PersonaNonEgo,
     ReconfiguredEgo,
+    RetrainedEgo,
     SumoNonEgo,
     player_of,
     strategy_name,
@@ -60,6 +62,8 @@ class SeedStages:
 
     campaign: Campaign
     seed: int
+    gates: dict[EgoStrategy | NonEgoStrategy, tuple[EquilibriumGate, ...]] = field(default_factory=dict)
+    """Of the strategies after round 2: the gates before their trainings."""
 
     def side(self, strategy: EgoStrategy | NonEgoStrategy | None) -> Side:
         """The side that plays a strategy; no one for None."""
@@ -76,18 +80,21 @@ class SeedStages:
         members = tuple(self._driver(PersonaNonEgo(persona=name)) for name in shares)
         return members[0] if len(members) == 1 else FixedMixture(members=members, shares=tuple(shares.values()))
 
-    def assessment(self, arm: Arm, *, persona: str = "", gates: tuple[EquilibriumGate, ...] = ()) -> AssessmentStage:
-        ego, non_ego = self.side(arm.ego), self.side(arm.non_ego)
-        return AssessmentStage(seed=self.seed, persona=persona, arm=arm, ego=ego, non_ego=non_ego, gates=gates)
+    def pair(self, ego: EgoStrategy, non_ego: PersonaNonEgo) -> AssessmentStage:
+        """The assessment of an ego against a person."""
+        return self.assessment(Arm(ego=ego, non_ego=non_ego), persona=non_ego.persona)
 
-    def training(
-        self,
-        strategy: EgoStrategy | PersonaNonEgo,
-        opponent: Side,
-        *,
-        persona: str = "",
-        gates: tuple[EquilibriumGate, ...] = (),
-    ) -> TrainingStage:
+    def assessment(self, arm: Arm, *, persona: str = "") -> AssessmentStage:
+        ego, non_ego = self.side(arm.ego), self.side(arm.non_ego)
+        gates = [self.gates[each] for each in (arm.ego, arm.non_ego) if each in self.gates]
+        # a later strategy of a persona has the gates of the earlier ones of this persona
+        if isinstance(arm.ego, RetrainedEgo) and arm.ego.against == persona:
+            gates = [max(gates, key=len, default=())]
+        return AssessmentStage(
+            seed=self.seed, persona=persona, arm=arm, ego=ego, non_ego=non_ego, gates=tuple(chain.from_iterable(gates))
+        )
+
+    def training(self, strategy: EgoStrategy | PersonaNonEgo, opponent: Side, *, persona: str = "") -> TrainingStage:
         """The training of a person, or of an ego after the naive one."""
         campaign, is_person = self.campaign, player_of(strategy) == NON_EGO
         warm = campaign.retraining.warm_start and not is_person
@@ -99,7 +106,7 @@ class SeedStages:
             initial=self._learned(NaiveEgo()) if warm else None,
             alone_share=campaign.non_ego_training.alone_share if is_person else campaign.retraining.alone_share,
             attentive_share=ATTENTIVE_SHARE if is_person else 0.0,
-            gates=gates,
+            gates=self.gates.get(strategy, ()),
         )
 
     def _driver(self, strategy: EgoStrategy | NonEgoStrategy) -> PlannedMember:
