@@ -25,7 +25,7 @@ from harness.road.scene.open_scene import OpenScene
 from harness.shipped_documents import find_document
 
 DRIVER = "driver.toml"
-"""The driver document in the folder of a policy that others trained."""
+"""The driver document in the folder of a policy that others trained, or of a search."""
 
 
 def find_policies(file: Path, written: str | None, exist: bool = True) -> Path | None:

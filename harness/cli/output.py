@@ -97,18 +97,13 @@ def print_json(content: Any) -> None:
 @contextmanager
 def _log_shown(console: Console) -> Iterator[None]:
     """Print what is logged of a run, with details, above the bars of a console."""
-    from harness.campaign.storage.run_log import LOGGER, RunLogFormatter
+    from harness.campaign.storage.run_log import LOGGER, RunLogFormatter, logged_to
 
     class Shown(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
             print_plain([self.format(record)], console, "dim")
 
-    handler, level = Shown(), LOGGER.level
+    handler = Shown()
     handler.setFormatter(RunLogFormatter())
-    LOGGER.addHandler(handler)
-    LOGGER.setLevel(logging.DEBUG)
-    try:
+    with logged_to(handler, LOGGER, logging.DEBUG):
         yield
-    finally:
-        LOGGER.removeHandler(handler)
-        LOGGER.setLevel(level)

@@ -1,21 +1,37 @@
-"""The section on the game: verdicts on best responses, small tables, heat maps and the solutions of the game."""
+"""The section on the game: verdicts on best responses, small tables, heat maps and the solutions of the game.
+
+"Not refuted" is the best answer here: a gap is a lower bound, so no search can show an equilibrium between drivers.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import pandas as pd
 
 from harness.evaluation.competence import Verdict
+from harness.evaluation.game_theory.best_response_gap import NOTHING_TO_GAIN, GapVerdict
+from harness.evaluation.game_theory.empirical_game import ALL, SolutionKind
 from harness.evaluation.game_theory.findings import GameFindings
 from harness.reports.data_table import table
 from harness.reports.game_links import GameLinks
-from harness.reports.game_wording import equilibrium_sentences, fewer_failures, gap_verdicts
 from harness.reports.heatmaps import views
-from harness.reports.numbers import MISSING, interval, percent
-from harness.reports.verdict_wording import NOT_ANSWERED, as_sentence
+from harness.reports.numbers import MISSING, NO_SPACE, SURE, interval, number, p_text, percent, signed, sure, trimmed
+from harness.reports.run_tables import Row
+from harness.reports.verdict_wording import NOT_ANSWERED, Answer, as_sentence, left_out
 
+QUESTION = "Equilibrium"
+NO, NEAR, OPEN = "no", "not refuted", "not decided"
+MEANINGS = {
+    NO: "not an equilibrium",
+    NEAR: "this search found nothing against an equilibrium",
+    OPEN: "it is not decided whether this is an equilibrium",
+}
+"""The end of a pair's sentence, by its label."""
+NOT_VERIFIED = "No equilibrium could be verified with the accuracy of the numbers."
+NO_GAME = "No ego was measured against all of these: there is no game to solve."
 CAPTIONS = {
     "gaps": "A row per best response.",
     "crossplay": "A row per pairing of an ego and a non-ego.",
@@ -64,3 +80,215 @@ def _new_persona(rows: pd.DataFrame) -> dict[str, str]:
         "difference": fewer_failures(rows["fewer_failures"].mean(), *ends),
         "significant": f"{significant} of {answered}" if answered else NOT_ANSWERED,
     }
+
+
+def gap_verdicts(gaps: pd.DataFrame) -> list[tuple[str, Answer]]:
+    """For each persona, whether its last pair is an equilibrium (equation 2), for the page and the terminal."""
+    verdicts = []
+    for persona in dict.fromkeys(gaps["persona"]):
+        rows = gaps[gaps["persona"] == persona]
+        last = rows[rows["round"] == rows.groupby("seed")["round"].transform("max")]
+        pairs = [pair.to_dict("records") for _, pair in last.groupby(["seed", "ego", "non_ego"], sort=False)]
+        verdicts.append((str(persona), _of_pairs(str(persona), pairs)))
+    return verdicts
+
+
+def _of_pair(rows: Sequence[Row]) -> Answer:
+    """Whether a pair is an equilibrium as far as was found, and how a best-responding persona affects the ego. `rows`
+    are one for each side for which a best response was trained."""
+    by_role = {row["role"]: row for row in rows}
+    ego, non_ego, seed = by_role.get("ego"), by_role.get("non_ego"), rows[0]["seed"]
+    if reason := rows[0]["reason"]:  # the same of both sides
+        return Answer(question=QUESTION, seed=seed, label=NOT_ANSWERED, sentence=as_sentence(reason))
+    label = _label([GapVerdict(row["verdict"]) for row in rows], both=ego is not None and non_ego is not None)
+    sentence = f"{_both_sides(str(rows[0]['persona']), ego, non_ego)}: {MEANINGS[label]}."
+    harmful = non_ego is not None and non_ego["failure_difference_low"] > 0
+    return Answer(
+        question=QUESTION,
+        seed=seed,
+        label=label,
+        tone="harm" if harmful else "open",  # "not refuted" is no yes
+        sentence=sentence[0].upper() + sentence[1:] + "".join(map(left_out, rows)),
+        speed="" if non_ego is None else _induced_failures(non_ego),
+    )
+
+
+def _label(verdicts: Sequence[GapVerdict], both: bool) -> str:
+    if GapVerdict.DISTINGUISHABLE in verdicts:
+        return NO
+    return NEAR if both and NOTHING_TO_GAIN.issuperset(verdicts) else OPEN
+
+
+def _both_sides(persona: str, ego: Row | None, non_ego: Row | None) -> str:
+    driver = f"the {persona} driver"
+    gains = [each for each in (ego, non_ego) if each is not None and each["verdict"] == GapVerdict.DISTINGUISHABLE]
+    if non_ego is not None and [math.isfinite(each["gap_share"]) for each in gains] == [True, True]:
+        return f"{_side('the ego', ego)}; {driver} {_share(non_ego)}"
+    return f"{_side('the ego', ego)}; {_side(driver, non_ego)}"
+
+
+def _induced_failures(row: Row) -> str:
+    """How often the ego fails against a persona that was newly trained against it."""
+    games, rate = row["pairs"], row["ego_failure_rate_best_response"]
+    if not games:
+        return f"The effect of a {row['persona']} driver newly trained against this ego was not measured."
+    span = sure(row["ego_failure_rate_best_response_low"], row["ego_failure_rate_best_response_high"])
+    counts = f"{round(rate * games)} of {games} games ({percent(rate)}; {span})"
+    text = f"{_newly_trained(str(row['persona']))} {counts} instead of {round(row['ego_failure_rate'] * games)}"
+    if GapVerdict(row["verdict"]) is GapVerdict.NONE_FOUND:
+        return f"{text}, but this driver does not earn more by it."
+    return f"{text}."
+
+
+def _newly_trained(persona: str) -> str:
+    return f"A {persona} driver newly trained against this ego makes it fail in"
+
+
+def _side(player: str, row: Row | None) -> str:
+    if row is None:
+        return f"no best response of {player} was trained"
+    match GapVerdict(row["verdict"]):
+        case GapVerdict.DISTINGUISHABLE:
+            return f"{player} could still gain {_share(row)} of its payoff"
+        case GapVerdict.BEFORE_HOLM_ONLY:
+            holm = f"but not after Holm's correction ({p_text(row['p_holm'])})"
+            return f"{player} might gain {_share(row)} of its payoff, {holm}"
+        case GapVerdict.NOT_DISTINGUISHABLE:
+            measured = f"for {player} a gain of {_share(row)} was measured"
+            return f"{measured}, which is not distinguishable from 0{_span(row)}"
+        case GapVerdict.NONE_FOUND:
+            return f"for {player} nothing better was found"
+        case GapVerdict.NO_DIFFERENCE:
+            return f"the best response of {player} earns the same in every game"
+        case GapVerdict.ALL_EQUAL:
+            return f"{player} gains {_share(row)} of its payoff, the same in every game: there is no test"
+        case _:
+            return f"for {player} too few games could be compared"
+
+
+def _share(row: Row) -> str:
+    """The gap as a share of the payoff; where the payoff is 0, the gap itself."""
+    if math.isfinite(row["gap_share"]):
+        return percent(row["gap_share"])
+    return f"{number(row['gap'], 2)} above the 0"
+
+
+def _span(row: Row) -> str:
+    """The gap's interval as shares of the payoff; empty where there is none."""
+    if not (row["payoff"] and math.isfinite(row["ci_low"])):
+        return ""
+    low, high = (signed(row[end] / abs(row["payoff"]) * 100, 1) for end in ("ci_low", "ci_high"))
+    return f" ({SURE}: {low} to {high}{NO_SPACE}%)"
+
+
+def _of_pairs(persona: str, pairs: Sequence[Sequence[Row]]) -> Answer:
+    """The answer of the pair, or of several: of all seeds, or of all pairs of the last round."""
+    answers = [_of_pair(rows) for rows in pairs]
+    several = len(answers)
+    if several == 1:
+        return answers[0]
+    unit = "seeds" if len({answer.seed for answer in answers}) == several else "pairs"
+    findings = {
+        NO: f"the ego or the {persona} driver could still gain by a change of strategy alone (after Holm's correction)",
+        NEAR: "no gain that is distinguishable from 0 was found for either side",
+        OPEN: "it is not decided",
+        NOT_ANSWERED: "it is not answered",
+    }
+    counts = {label: sum(answer.label == label for answer in answers) for label in findings}
+    sentence = "; ".join(
+        f"in {count} of {several} {unit} {findings[label]}" for label, count in counts.items() if count
+    )
+    headline = next((label for label in (NO, NEAR, OPEN) if counts[label]), NOT_ANSWERED)
+    measured = [row for rows in pairs for row in rows if not row["reason"] and row["pairs"]]
+    responders = [row for row in measured if row["role"] == "non_ego"]
+    return Answer(
+        question=QUESTION,
+        label=headline if headline in (OPEN, NOT_ANSWERED) else f"{headline} in {counts[headline]} of {several} {unit}",
+        tone="harm" if "harm" in [answer.tone for answer in answers] else "open",
+        sentence=f"{sentence[0].upper()}{sentence[1:]}.",
+        speed=_induced_in_several(persona, responders, unit),
+        per_seed=answers,
+    )
+
+
+def _induced_in_several(persona: str, responders: Sequence[Row], unit: str) -> str:
+    if not responders:
+        return ""
+    rates = [row["ego_failure_rate_best_response"] for row in responders]
+    before = sum(row["ego_failure_rate"] for row in responders) / len(rates)
+    text = f"{_newly_trained(persona)} {percent(sum(rates) / len(rates))} of games "
+    return f"{text}(mean of {len(rates)} {unit}: {interval(min(rates), max(rates))}) instead of {percent(before)}."
+
+
+def equilibrium_sentences(equilibria: pd.DataFrame) -> list[tuple[int, str, list[str]]]:
+    """For each seed and game: its solutions in sentences, the one to choose first."""
+    return [
+        (int(seed), str(game), list(filter(None, (_solution(game, rows), _dominated(rows), _left_out(rows)))))
+        for (seed, game), rows in equilibria.groupby(["seed", "game"], sort=False)
+    ]
+
+
+def _solution(game: str, rows: pd.DataFrame) -> str:
+    solved = rows[rows["solution"].isin([SolutionKind.NASH.value, SolutionKind.SAFEST.value])]
+    if not len(solved):
+        return NOT_VERIFIED if (rows["solution"] == SolutionKind.NOT_VERIFIED.value).any() else NO_GAME
+    if game == ALL:
+        return _safest(solved.to_dict("records"))
+    first = solved[solved["number"] == 1].to_dict("records")
+    sides = {role: _mixture([row for row in first if row["role"] == role]) for role in ("ego", "non_ego")}
+    rate = percent(first[0]["solution_failure_rate"])
+    text = (
+        f"In equilibrium the ego plays {sides['ego']}, the {game} driver {sides['non_ego']}: the ego fails in {rate} "
+    )
+    text += f"of games and earns {number(first[0]['solution_payoff'], 2)}."
+    more = int(solved["number"].max()) - 1
+    return text + (f" {more} more {'is' if more == 1 else 'are'} in the table." if more else "")
+
+
+def _safest(rows: Sequence[Row]) -> str:
+    egos = [row for row in rows if row["role"] == "ego"]
+    most = egos[0]["solution_failure_rate"]
+    worst = [row["player"] for row in rows if row["role"] == "non_ego" and row["failure_rate"] >= most - 1e-6]
+    best = min(egos, key=lambda row: row["failure_rate"])
+    text = f"The safest choice of egos is {_mixture(egos)}: in the worst case it fails in {percent(most)} of games"
+    text += f" (against {', '.join(worst)})." if most > 0 else "."
+    if sum(row["share"] > 0 for row in egos) > 1:
+        text += f" The safest single ego is {best['player']}, with {percent(best['failure_rate'])} in the worst case."
+    return text
+
+
+def _mixture(rows: Sequence[Row]) -> str:
+    played = [row for row in rows if row["share"] >= 0.0005]
+    if len(played) == 1:
+        return f"{played[0]['player']} alone"
+    return " + ".join(f"{percent(row['share'])} {row['player']}" for row in played)
+
+
+def _dominated(rows: pd.DataFrame) -> str:
+    """The egos that another ego, or a mixture of egos, is better than against every strategy of the other side."""
+    egos = rows[rows["role"] == "ego"].drop_duplicates("player").to_dict("records")
+    texts = []
+    for row in egos:
+        dominators = {"in payoff": row["dominated_in_payoff"], "in failures": row["dominated_in_failures"]}
+        clauses = [f"{measure} by {name}" for measure, name in dominators.items() if name]
+        if clauses:
+            texts.append(f"{row['player']} ({', '.join(clauses)})")
+    return f"Dominated: {'; '.join(texts)}." if texts else ""
+
+
+def _left_out(rows: pd.DataFrame) -> str:
+    names = rows.loc[rows["solution"] == SolutionKind.NOT_PLAYED.value, "player"]
+    return f"Left out, because not played against all: {', '.join(names)}." if len(names) else ""
+
+
+def fewer_failures(difference: float, low: float, high: float) -> str:
+    """A difference of failure rates against the naive ego's, with its interval if it is finite."""
+    if math.isnan(difference):
+        return MISSING
+    if difference == 0:
+        return "none"
+    text = f"{trimmed(abs(difference) * 100, 1)} points {'fewer' if difference > 0 else 'more'}"
+    if math.isfinite(low):
+        low, high = (low * 100, high * 100) if difference > 0 else (-high * 100, -low * 100)
+        text += f" ({signed(low, 1)} to {signed(high, 1)})"
+    return text

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 
 from harness.evaluation.worst_first import worst_first
+from harness.game.arrays import FloatArray
 from harness.reports.figures import GAME, INK, SERIES, figure_of, svg
 from harness.reports.game_links import GameLinks
 from harness.reports.numbers import MISSING, number, trimmed
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Floats = npt.NDArray[np.float64]
 WorstGames = Mapping[tuple[str, int | None], str]
 """The address of the worst game of each arm and seed, and under the seed None of each arm."""
 
@@ -176,7 +175,7 @@ def _draw_cells(
             axes.text(column + 0.5, row + 0.82, quantity.span(cell), ha="center", fontsize=8, color=INK)
 
 
-def _shades(quantity: _Quantity, values: Floats, personas: list[str]) -> Floats:
+def _shades(quantity: _Quantity, values: FloatArray, personas: list[str]) -> FloatArray:
     """How dark each cell is, from 0 to 1; NaN stays. Payoffs of non-egos are compared within a persona."""
     if quantity.per_cent:
         most = np.nanmax(values, initial=0.0)

@@ -13,9 +13,17 @@ from harness.evaluation.column import POINTS, SHARE
 from harness.evaluation.game_theory.best_response_gap import GapVerdict, Response, gaps
 from harness.evaluation.game_theory.empirical_game import equilibria
 from harness.evaluation.tables import columns_of, table_of, write_csv
-from harness.reports.game import CAPTIONS, game_section
+from harness.reports.game import (
+    CAPTIONS,
+    MEANINGS,
+    NEAR,
+    NO,
+    OPEN,
+    equilibrium_sentences,
+    game_section,
+    gap_verdicts,
+)
 from harness.reports.game_links import GameLinks
-from harness.reports.game_wording import MEANINGS, NEAR, NO, OPEN, equilibrium_sentences, gap_verdicts
 from harness.reports.heatmaps import OPENS_A_GAME, views
 from tests.support.chromium import COLOURS, contrast, rgb, unfold
 from tests.support.game_tables import arm, findings, table

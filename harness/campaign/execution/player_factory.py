@@ -29,6 +29,7 @@ from harness.campaign.plan.stages import (
 )
 from harness.campaign.storage.arm_tables import arm_tables
 from harness.campaign.storage.run_folder import RunFolder
+from harness.campaign.trained_policies import DRIVER
 from harness.config.driver import read_driver
 from harness.config.tunable import Adjustable
 from harness.drivers.car import car_of
@@ -41,8 +42,6 @@ from harness.evaluation.game_theory.nash import NoEquilibrium, equilibrium_share
 from harness.game.roles import EGO
 from harness.road.scene.open_scene import OpenScene
 
-DRIVER = "driver.toml"
-"""The file of the driver that a search found, in the folder of its stage."""
 _LEAST_SHARE = 1e-6  # members of a mixture with a smaller share are left out
 
 

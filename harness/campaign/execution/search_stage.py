@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from harness.campaign.execution.player_factory import DRIVER, PlayerFactory
+from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import StageRun
 from harness.campaign.plan.stages import SearchStage
 from harness.campaign.storage.versions import versions_since
+from harness.campaign.trained_policies import DRIVER
 from harness.config.tunable import Tunable
 from harness.errors import StageFailed
 from harness.evaluation.tables import table_of, write_csv

@@ -12,8 +12,8 @@ import os
 import tempfile
 import time
 import traceback
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -23,6 +23,7 @@ from harness.campaign.plan.stages import External, Stage
 from harness.campaign.preflight import OpenCampaign
 from harness.campaign.storage.locks import held_by_worker
 from harness.campaign.storage.run_folder import RunFolder
+from harness.campaign.storage.run_log import logged_to
 from harness.config.campaign import Campaign
 from harness.config.persona import Persona
 from harness.drivers.external import ExternalDriver
@@ -182,12 +183,8 @@ def _put_scratch_into(folder: RunFolder) -> None:
     tempfile.tempdir = None
 
 
-OnPreparation: TypeAlias = Callable[[str, int, int], None]
-"""Called with what is prepared, and how many of its parts are done and how many there are; 0 of 0: not known."""
-
-
 class _Forwarder(logging.Handler):
-    def __init__(self, on_preparation: OnPreparation) -> None:
+    def __init__(self, on_preparation: Callable[[str, int, int], None]) -> None:
         super().__init__(logging.INFO)
         self._on_preparation = on_preparation
 
@@ -195,14 +192,7 @@ class _Forwarder(logging.Handler):
         self._on_preparation(record.getMessage(), getattr(record, "done", 0), getattr(record, "total", 0))
 
 
-@contextmanager
-def preparations_reported(on_preparation: OnPreparation) -> Iterator[None]:
-    """Report what this process prepares during the block."""
-    forwarder, level = _Forwarder(on_preparation), _LOGGER.level
-    _LOGGER.addHandler(forwarder)
-    _LOGGER.setLevel(logging.INFO)
-    try:
-        yield
-    finally:
-        _LOGGER.removeHandler(forwarder)
-        _LOGGER.setLevel(level)
+def preparations_reported(on_preparation: Callable[[str, int, int], None]) -> AbstractContextManager[None]:
+    """Report what this process prepares during the block: called with what is prepared, and how many of its parts are
+    done and how many there are; 0 of 0: not known."""
+    return logged_to(_Forwarder(on_preparation), _LOGGER, logging.INFO)

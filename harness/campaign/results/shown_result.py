@@ -9,7 +9,7 @@ from harness.config.campaign import Campaign
 from harness.errors import plain
 from harness.evaluation.unplayed_games import reasons_of
 from harness.reports.acceptance_wording import acceptance_lines
-from harness.reports.game_wording import gap_verdicts
+from harness.reports.game import gap_verdicts
 from harness.reports.next_steps import to_learn
 from harness.reports.run_tables import QUESTIONS, RunTables
 from harness.reports.verdict_wording import Answer, answer

@@ -9,7 +9,7 @@ import logging
 import platform
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 from harness.errors import HarnessError, UsageError, plain
@@ -39,6 +39,19 @@ class _LogFile(logging.FileHandler):
 
 
 @contextmanager
+def logged_to(handler: logging.Handler, logger: logging.Logger, level: int) -> Iterator[None]:
+    """Give a handler what is logged during the block, at this level and above."""
+    before = logger.level
+    logger.addHandler(handler)
+    logger.setLevel(level)
+    try:
+        yield
+    finally:
+        logger.removeHandler(handler)
+        logger.setLevel(before)
+
+
+@contextmanager
 def run_log(folder: Path) -> Iterator[None]:
     """Append what is logged during the block to the log of a run folder, and how the block ended.
 
@@ -47,21 +60,15 @@ def run_log(folder: Path) -> Iterator[None]:
     file = folder / LOG
     if file.is_symlink() or (file.exists() and not file.is_file()):
         raise UsageError.of(file, "", "is not a file", "remove it: the log of the run has this name")
-    handler, level = _LogFile(file, encoding="utf-8"), LOGGER.level
+    handler, level = _LogFile(file, encoding="utf-8"), min(LOGGER.level or logging.INFO, logging.INFO)
     handler.setFormatter(RunLogFormatter())
-    LOGGER.addHandler(handler)
-    LOGGER.setLevel(min(level, logging.INFO) if level else logging.INFO)
     started = time.monotonic()
-    LOGGER.info("harness %s on Python %s, %s", __version__, platform.python_version(), platform.platform())
-    try:
-        yield
-    except BaseException as error:
-        is_a_bug = isinstance(error, Exception) and not isinstance(error, HarnessError | OSError)
-        LOGGER.error("ended by %s: %s", type(error).__name__, error, exc_info=is_a_bug)
-        raise
-    else:
+    with closing(handler), logged_to(handler, LOGGER, level):
+        LOGGER.info("harness %s on Python %s, %s", __version__, platform.python_version(), platform.platform())
+        try:
+            yield
+        except BaseException as error:
+            is_a_bug = isinstance(error, Exception) and not isinstance(error, HarnessError | OSError)
+            LOGGER.error("ended by %s: %s", type(error).__name__, error, exc_info=is_a_bug)
+            raise
         LOGGER.info("ended after %.0f s", time.monotonic() - started)
-    finally:
-        LOGGER.removeHandler(handler)
-        LOGGER.setLevel(level)
-        handler.close()
