@@ -55,8 +55,6 @@ _ADDRESS_SPACE_BYTES = 2.5e9  # libraries reserve 2.0 GB, and abort or hang wher
 INTERRUPTED = 130
 """The exit code after Ctrl-C: 128 plus the number of SIGINT."""
 
-_STYLES = {"harm": "bold red", "mended": "bold green", "open": "bold yellow"}
-
 app = typer.Typer(
     name="harness",
     no_args_is_help=True,
@@ -212,17 +210,8 @@ def _end_with(outcome: RunResult, run: Path, console: Console, as_json: bool = F
     What failed is said also where the console is quiet. As JSON: the content of `result.json`, the run folder and the
     report.
     """
-    did_not_learn = [f"Did not learn: {training}" for training in outcome.did_not_learn]
-    print_plain(did_not_learn, console, "bold yellow")
-    for verdict in outcome.verdicts:
-        label = f"{verdict.persona}, {verdict.question}: {verdict.label}"
-        console.print(label, style=_STYLES[verdict.tone], highlight=False, markup=False)
-        for sentence in filter(None, (verdict.sentence, *verdict.causes, verdict.speed)):
-            console.print(f"  {sentence}", highlight=False, markup=False)
-    for step in outcome.to_learn:
-        print_plain([f"To try: {step.sentence}", *(f"  {line}" for line in step.lines)], console)
-    for bound in outcome.acceptance:
-        print_plain([bound.text], console, "green" if bound.passed else "bold red")
+    for line in outcome.lines:
+        console.print(line.text, style=line.style or None, highlight=False, markup=False)
     print_plain([f"Report: {run / 'report.html'}"], console)
     if as_json:
         from harness.campaign.results.ci_files import RESULT
@@ -231,8 +220,7 @@ def _end_with(outcome: RunResult, run: Path, console: Console, as_json: bool = F
         print_json({"run": str(run), "report": str(run / "report.html"), **result})
     if console.quiet:
         console.quiet = False
-        print_plain(did_not_learn, console)
-        print_plain((bound.text for bound in outcome.acceptance if not bound.passed), console)
+        print_plain((line.text for line in outcome.lines if line.is_failure), console)
     if outcome.failed_stages:
         reasons = dict.fromkeys(filter(None, outcome.failed_stages.values()))
         stages = f"Not finished: {', '.join(outcome.failed_stages)}"

@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from harness.campaign.results.kept_results import RunResult
+from harness.campaign.results.shown_result import Verdicts
+from harness.campaign.storage.learned import did_not_learn
 from harness.campaign.storage.manifest import FINISHED, FORMAT
 from harness.campaign.storage.run_folder import RunFolder
 from harness.evaluation.comparisons.acceptance_checks import Check
@@ -20,7 +22,11 @@ RESULT, JUNIT = "result.json", "junit.xml"
 
 
 def write_ci_files(
-    folder: RunFolder, manifest: Mapping[str, Any], checks: Sequence[Check] | None, result: RunResult
+    folder: RunFolder,
+    manifest: Mapping[str, Any],
+    checks: Sequence[Check] | None,
+    verdicts: Verdicts,
+    result: RunResult,
 ) -> None:
     """Write `result.json` and `junit.xml`: the acceptance checks, and whether every stage was carried out."""
     properties = {"harness": str(manifest["versions"].get("harness", "")), "campaign": manifest["name"]}
@@ -34,11 +40,11 @@ def write_ci_files(
         "exit_code": result.exit_code,
         "acceptance": [_record(check) for check in checks or ()],
         "verdicts": [
-            {name: getattr(verdict, name) for name in ("persona", "question", "label", "sentence")}
-            for verdict in result.verdicts
+            {"persona": persona, **{name: getattr(verdict, name) for name in ("question", "label", "sentence")}}
+            for persona, verdict, _ in verdicts
         ],
         "failed_stages": list(result.failed_stages),
-        "did_not_learn": list(result.did_not_learn),
+        "did_not_learn": [": ".join(each) for each in did_not_learn(manifest["stages"]).items()],
         "error_games": result.error_games,
         "versions": manifest["versions"],
     }

@@ -13,7 +13,7 @@ import importlib.metadata
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError
 
@@ -31,54 +31,25 @@ Line = Annotated[str, Field(max_length=10_000, pattern=r"^[^\x00-\x1f\x7f-\x9f]*
 """A text that is safe to print on a terminal."""
 
 
-class ShownVerdict(Document):
-    """A conclusion as the terminal shows it."""
-
-    persona: Line
-    question: Line
-    label: Line
-    tone: Line
-    sentence: Line
-    speed: Line
-    causes: tuple[Line, ...] = ()
-    """Why the ego of the question failed, a line for each kind of cause."""
-
-
-class ShownCheck(Document):
-    """An acceptance check as the terminal shows it."""
-
-    passed: bool
+class ShownLine(Document):
     text: Line
-
-
-class ShownStep(Document):
-    """A thing to try as the terminal shows it: a sentence, and the lines of a command or of a campaign's file."""
-
-    sentence: Line
-    lines: tuple[Line, ...]
+    style: Literal["", "green", "bold red", "bold green", "bold yellow"] = ""
+    is_failure: bool = False
+    """Shown also where the console is quiet."""
 
 
 class RunResult(Document):
     """The result of a run, for the terminal and the exit code."""
 
-    verdicts: tuple[ShownVerdict, ...]
-    """One for each persona and question."""
+    lines: tuple[ShownLine, ...]
+    """Verdicts, what did not learn, what to try, and acceptance checks: for each bound and persona the worst."""
     failed_stages: Mapping[Line, Line]
     """Those that are not finished, each with the reason; empty where there is none yet."""
     error_games: int = Field(ge=0)
     error_reasons: tuple[Line, ...] = ()
     """Why games could not be played, the most frequent reason first."""
-    did_not_learn: tuple[Line, ...] = ()
-    """The trainings that made no player that can drive the scene, each with its share of goals and the bound."""
-    to_learn: tuple[ShownStep, ...] = ()
-    """What to try so that they learn, the first first."""
-    acceptance: tuple[ShownCheck, ...] = ()
-    """For each bound and persona the worst check; empty if the campaign has no bounds."""
-
-    @property
-    def accepted(self) -> bool | None:
-        """Whether every bound is kept; None if the campaign has no bounds."""
-        return all(check.passed for check in self.acceptance) if self.acceptance else None
+    accepted: bool | None
+    """Whether every bound is kept; None if the campaign has no bounds."""
 
     @property
     def exit_code(self) -> int:

@@ -15,7 +15,7 @@ from harness.campaign.results.model_cards import write_model_cards
 from harness.campaign.results.read_run import read_run
 from harness.campaign.results.recorded_games import recorded_games, scene_drawing
 from harness.campaign.results.replay_game import read_game
-from harness.campaign.results.shown_result import shown_result
+from harness.campaign.results.shown_result import shown_result, verdicts_of
 from harness.campaign.results.shown_work import doing, progress_bar, say
 from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.run_log import LOGGER
@@ -43,8 +43,9 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
         games = recorded_games(tables.episodes, tables.arms, folder.traces_of_arm, run.scene)
         page = render_page(tables, games, scene_drawing(run.scene))
     write_atomically(folder.path / "report.html", page.encode())
-    result = shown_result(run.campaign, tables)
-    write_ci_files(folder, tables.manifest, tables.acceptance, result)
+    verdicts = verdicts_of(run.campaign, tables)
+    result = shown_result(run.campaign, tables, verdicts)
+    write_ci_files(folder, tables.manifest, tables.acceptance, verdicts, result)
     warn(mixed_versions(tables.stages), console)
     keep_result(folder, run.manifest, result)
     LOGGER.info("wrote the results of %d games; exit code %d", len(tables.episodes), result.exit_code)

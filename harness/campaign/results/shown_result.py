@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from harness.campaign.results.kept_results import RunResult, ShownCheck, ShownStep, ShownVerdict
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, TypeAlias
+
+from harness.campaign.results.kept_results import RunResult, ShownLine
 from harness.campaign.storage.learned import did_not_learn
 from harness.campaign.storage.manifest import FINISHED
 from harness.config.campaign import Campaign
@@ -14,18 +17,27 @@ from harness.reports.next_steps import to_learn
 from harness.reports.run_tables import QUESTIONS, RunTables
 from harness.reports.verdict_wording import Answer, answer
 
+Verdicts: TypeAlias = Sequence[tuple[str, Answer, tuple[str, ...]]]
+"""Of each persona and question: the answer, and why the ego failed, a line for each kind of cause."""
+_STYLES: Mapping[str, Any] = {"harm": "bold red", "mended": "bold green", "open": "bold yellow"}
 
-def shown_result(campaign: Campaign, tables: RunTables) -> RunResult:
-    """What the terminal shows: verdicts, acceptance checks, and what went wrong."""
+
+def verdicts_of(campaign: Campaign, tables: RunTables) -> Verdicts:
+    """The verdicts of a run, those on pairs of its game at the end."""
     verdicts = [
-        _shown(persona, answer(tables, question, persona), tables.causes_of(question, persona))
+        (persona, answer(tables, question, persona), tables.causes_of(question, persona))
         for persona in [*tables.manifest["personas"], *campaign.mixed_people]
         for question in QUESTIONS
     ]
-    if tables.game is not None:
-        verdicts += [_shown(persona, verdict) for persona, verdict in gap_verdicts(tables.game.gaps)]
+    of_pairs = gap_verdicts(tables.game.gaps) if tables.game is not None else []
+    return [*verdicts, *((persona, verdict, ()) for persona, verdict in of_pairs)]
+
+
+def shown_result(campaign: Campaign, tables: RunTables, verdicts: Verdicts) -> RunResult:
+    """What the terminal shows."""
+    checks = tables.acceptance
     return RunResult(
-        verdicts=tuple(verdicts),
+        lines=tuple(_lines(campaign, tables, verdicts)),
         failed_stages={
             name: plain((entry.get("message") or "").strip().rpartition("\n")[2][:1000])
             for name, entry in tables.stages.items()
@@ -33,18 +45,21 @@ def shown_result(campaign: Campaign, tables: RunTables) -> RunResult:
         },
         error_games=int((tables.episodes["error"] != "").sum()),
         error_reasons=tuple(map(plain, reasons_of(tables.episodes["error"]))),
-        did_not_learn=tuple(f"{name}: {shortfall}" for name, shortfall in did_not_learn(tables.stages).items()),
-        to_learn=tuple(
-            ShownStep(sentence=plain(each.sentence), lines=tuple(map(plain, each.command.splitlines())))
-            for each in to_learn(tables)
-        ),
-        acceptance=tuple(
-            ShownCheck(passed=each.passed, text=each.text)
-            for each in acceptance_lines(tables.acceptance or (), len(campaign.seeds))
-        ),
+        accepted=all(check.passed for check in checks) if checks else None,
     )
 
 
-def _shown(persona: str, verdict: Answer, causes: tuple[str, ...] = ()) -> ShownVerdict:
-    told = {name: getattr(verdict, name) for name in ("question", "label", "tone", "sentence", "speed")}
-    return ShownVerdict(persona=persona, causes=causes, **told)
+def _lines(campaign: Campaign, tables: RunTables, verdicts: Verdicts) -> Iterator[ShownLine]:
+    for name, shortfall in did_not_learn(tables.stages).items():
+        yield ShownLine(text=f"Did not learn: {name}: {shortfall}", style="bold yellow", is_failure=True)
+    for persona, verdict, causes in verdicts:
+        yield ShownLine(text=f"{persona}, {verdict.question}: {verdict.label}", style=_STYLES[verdict.tone])
+        for sentence in filter(None, (verdict.sentence, *causes, verdict.speed)):
+            yield ShownLine(text=f"  {sentence}")
+    for step in to_learn(tables):
+        yield ShownLine(text=f"To try: {plain(step.sentence)}")
+        for line in step.command.splitlines():
+            yield ShownLine(text=f"  {plain(line)}")
+    for check in acceptance_lines(tables.acceptance or (), len(campaign.seeds)):
+        style: Any = "green" if check.passed else "bold red"
+        yield ShownLine(text=check.text, style=style, is_failure=not check.passed)

@@ -91,7 +91,7 @@ def test_kept_result__never_puts_control_characters_on_the_terminal(folder: RunF
     file, manifest = folder.path / ".stages" / "results.json", folder.manifest()
     kept = kept_result(folder, manifest)
     assert kept is not None
-    verdict = kept.verdicts[0].label
+    line = kept.lines[0].text
     text = file.read_text(encoding="utf-8")
-    file.write_text(text.replace(f'"label": "{verdict}"', '"label": "\\u001b[2J"'), encoding="utf-8")
+    file.write_text(text.replace(f'"text": "{line}"', '"text": "\\u001b[2J"'), encoding="utf-8")
     assert kept_result(folder, manifest) is None
