@@ -154,15 +154,6 @@ def test_campaign__more_episodes_keep_the_trainings_and_the_games_that_were_play
     pd.testing.assert_frame_equal(after[after["episode"] < 2].reset_index(drop=True), before)
 
 
-def test_campaign__an_ego_left_to_sumo_is_not_retrained() -> None:
-    run = sumo_run()
-    assert set(read_csv(run / "comparisons.csv")["question"]) == {"RQ1"}
-    assert names_in(run / "policies") == {"speedy-seed1"}
-    episodes = read_csv(run / "episodes.csv")
-    assert set(episodes["arm"]) == {"naive_alone", "naive_vs_sumo", "speedy_alone", "naive_vs_speedy"}
-    assert (episodes.loc[episodes["arm"] == "naive_alone", "ego_outcome"] == "goal").all()
-
-
 def test_campaign__an_ego_that_is_a_policy_drives_as_where_it_was_trained(
     run: Path, episodes: pd.DataFrame, tmp_path: Path
 ) -> None:

@@ -190,17 +190,11 @@ def test_campaign__naive_and_reconfigured_are_compared_as_naive_and_retrained_ar
 @pytest.mark.slow
 def test_campaign__the_report_and_the_terminal_say_reconfigured(run: Path) -> None:
     page = html.unescape((run / "report.html").read_text())
-    assert "Did reconfiguration fix it?" in page
-    assert "reconfigured ego, against speedy" in page
-    assert "0, 1 and 2: this ego is not trained, but its parameters are tuned" in page
     assert f"<code>policies/{STAGE}/driver.toml</code> in the run folder" in page
     assert re.search(
         r"<th scope=\"row\">cruise.time_gap_s</th><td>1.5</td><td>[\d.]+</td><td>0.8</td><td>2.5</td>", page
     )
     assert re.search(r"8 trials; the best is trial \d: mean payoff|8 trials, none better", page)
-    assert 'id="reconfiguration"' in page
-    words = re.sub(r"<[^>]*>", "", re.sub(r"<(script|style)>.*?</\1>", "", page, flags=re.DOTALL))
-    assert all("retrained or reconfigured" in line for line in words.splitlines() if "retrain" in line.lower())
     printed = (run.parent / "printed").read_text()
     assert "mixes versions" not in printed
     assert "8 trials in" in printed

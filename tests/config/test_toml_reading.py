@@ -148,6 +148,10 @@ def test_number__an_integer_is_accepted_as_a_float(write: Write) -> None:
         (Scene, SCENE + GOALS, "", "every player has a goal of its own: leave out [goal]"),
         (Campaign, CAMPAIGN + "[training]\nminibatch = 4096", "training", "must not exceed buffer (2048)"),
         (Campaign, CAMPAIGN + "[training]\ninitial_deviation = 0.6", "training", "must not exceed max_deviation (0.5)"),
+        (Campaign, CAMPAIGN + "[acceptance]\nego = 'naive'", "acceptance", "no bound is given"),
+        (Campaign, CAMPAIGN + "[acceptance]\ngap_share = 0.1", "acceptance.gap_share", "without [best_response]"),
+        (Campaign, CAMPAIGN + "[assessment]\nreference_drivers = false\n[acceptance]\npreventable_failure_rate = 0.1",
+         "acceptance.preventable_failure_rate", "is not judged which failures are preventable"),
         (Persona, PERSONA + FUZZY + FUZZY, "human.fuzzy[1].name", "'thrill' occurs twice"),
     ],
 )  # fmt: skip

@@ -95,13 +95,6 @@ def shown(steps: int) -> dict[str, Any]:
     return {**POLICY["training"], "steps": steps, "demonstration_steps": 38_400}
 
 
-PERCEPTION = {
-    "looked_but_failed_to_see_share": 0.3,
-    "noticed_within_m": 8.0,
-    "range_m": 60.0,
-    "distance_error": 0.1,
-}
-FACTORS = {"reaction": {"delay_s": [0.2, 0.4]}, "actuators": {"throttle_share": 0.5}, "perception": PERCEPTION}
 LIMITS = {
     "clearance": {"weight": 1.0, "within_m": 0.5},
     "red_light": {"weight": 2.0, "after_s": 2.0},
@@ -149,12 +142,6 @@ OF_SPEEDY = """
     - Actions are sampled from the policy's distribution
     - No blind-spot check in 85 % of the drives
 """
-OF_FACTORS = """
-    - In 30 % of the drives the person looks but fails to see: a vehicle is noticed within 8 m only.
-    - Vehicles more than 60 m away are never seen.
-    - A decision takes effect 0.2 to 0.4 s later
-    - The person uses 50 % of the acceleration of the car.
-"""
 
 
 @pytest.mark.parametrize(
@@ -167,7 +154,6 @@ OF_FACTORS = """
         case("retrained_distracted-seed1", OF_RETRAINED, against="distracted-seed1", began_from="naive-seed1"),
         case("distracted-seed1", OF_NON_EGO),
         case("distracted-seed1", OF_SPEEDY, persona("speedy")),
-        case("distracted-seed1", OF_FACTORS, FACTORS),
         case("distracted-seed1", ", within 0.5 m |\n, after 2 s |\n, within 1.2 s |", {"safety": {"terms": LIMITS}}),
         case("distracted-seed1", ", from 1.5 m/s |", {"safety": {"terms": LIMITS}}),
     ],
