@@ -20,11 +20,8 @@ from pathlib import Path
 from typing import IO, Any
 
 from harness.errors import SimulationError
-from harness.game.arrays import FloatArray
-from harness.game.initial_state import InitialState
-from harness.road.demand.route_file import Departure
 from harness.road.scene.open_scene import OpenScene
-from harness.sumo.simulation import AtReset, Reading, Simulation
+from harness.sumo.simulation import Simulation
 
 
 def open_simulation(
@@ -47,6 +44,11 @@ def open_simulation(
 _PATIENCE_S = 10.0  # time limit for a child to end
 
 
+def _in_the_child(method: str) -> Any:
+    """A method of a simulation that the one of the child process carries out."""
+    return lambda simulation, *arguments: simulation._call(method, *arguments)
+
+
 class SubprocessSimulation(Simulation):
     """A `LibsumoSimulation` in a child process. The child ends with `close`, or with this object."""
 
@@ -65,22 +67,7 @@ class SubprocessSimulation(Simulation):
             self.close()
             raise
 
-    def reload(self, seed: int) -> None:
-        self._call("reload", seed)
-
-    def reset(self, game: int, start: InitialState, departures: list[Departure]) -> AtReset:
-        at_reset: AtReset = self._call("reset", game, start, departures)
-        return at_reset
-
-    def halt(self, game: int, player: int) -> None:
-        self._call("halt", game, player)
-
-    def remove(self, game: int, player: int) -> None:
-        self._call("remove", game, player)
-
-    def step(self, x_m: FloatArray, y_m: FloatArray, heading_rad: FloatArray) -> Reading:
-        reading: Reading = self._call("step", x_m, y_m, heading_rad)
-        return reading
+    reload, reset, halt, remove, step = map(_in_the_child, ("reload", "reset", "halt", "remove", "step"))
 
     def close(self) -> None:
         self._finalizer()

@@ -10,8 +10,15 @@ import pytest
 
 from harness.environments.arena import Arena, Seat
 from harness.road.scene.open_scene import OpenScene
+from tests.support.scenes import build_scene
 
 Open = Callable[..., Any]
+
+
+@pytest.fixture(scope="session")
+def short(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
+    """A straight road with a time limit of 3 s."""
+    return build_scene(tmp_path_factory.mktemp("scenes") / "short", time_limit_s=3.0)
 
 
 @pytest.fixture

@@ -25,6 +25,7 @@ from harness.road.demand.route_file import Departure
 from harness.road.scene.open_obstacles import polygon_of
 from harness.road.scene.open_scene import OpenScene
 from tests.support.scenes import (
+    CROSSING,
     CROSSING_EDGES,
     CROSSING_NODES,
     LEFT_Y,
@@ -44,9 +45,8 @@ Open = Callable[..., Arena]
 
 @pytest.fixture(scope="module")
 def crossing(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
-    places = {"ego": ("wc ce", "wc_0"), "non_ego": ("sc ce", "sc_0"), "goal": "ce"}
     folder = tmp_path_factory.mktemp("scenes") / "crossing"
-    return build_scene(folder, CROSSING_NODES, CROSSING_EDGES, places, goal_m=50.0)
+    return build_scene(folder, CROSSING_NODES, CROSSING_EDGES, CROSSING, goal_m=50.0)
 
 
 @pytest.fixture(scope="module")

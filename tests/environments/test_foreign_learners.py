@@ -24,19 +24,12 @@ from stable_baselines3 import DQN
 from stable_baselines3.common.env_checker import check_env
 
 from harness import DrivingEnv, OpenScene, ParallelDrivingEnv, VectorDrivingEnv
-from tests.support.scenes import build_scene
 
 torch.set_num_threads(1)  # tiny networks: more threads only wait for each other
 
 Open = Callable[..., Any]
 CHOICES = np.array([[-1.0, 0.0], [0.0, 0.0], [1.0, 0.0]], dtype=np.float32)
 """Pedals and wheel of each of three discrete actions."""
-
-
-@pytest.fixture(scope="module")
-def short(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
-    """A straight road with a time limit of 3 s."""
-    return build_scene(tmp_path_factory.mktemp("scenes") / "short", time_limit_s=3.0)
 
 
 # --- checkers ---------------------------------------------------------------------------------------------------------

@@ -14,15 +14,8 @@ from gymnasium.vector import AutoresetMode
 from harness import Outcome, UsageError, VectorDrivingEnv, make_vec
 from harness.game.observation_layout import LAYOUT, SIZE
 from harness.road.scene.open_scene import OpenScene
-from tests.support.scenes import build_scene
 
 GAMES = 4
-
-
-@pytest.fixture(scope="module")
-def short(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
-    """A straight road with a time limit of 3 s."""
-    return build_scene(tmp_path_factory.mktemp("scenes") / "short", time_limit_s=3.0)
 
 
 def actions(pedals: float = 0.0, wheel: float = 0.0) -> Any:

@@ -17,6 +17,7 @@ from harness.game.geometry import (
     time_to_contact,
     time_to_first_contact,
 )
+from harness.road.scene.open_obstacles import polygon_of
 
 NUMBER = st.floats(-12.0, 12.0).map(lambda value: round(value, 3))
 
@@ -35,17 +36,6 @@ BOXES = st.builds(
 )
 
 
-def ring(each: Box) -> FloatArray:
-    """The corners [4, 2] of a box, in order, from the front left."""
-    along, across = 0.5 * each.length_m * np.array([1, 1, -1, -1]), 0.5 * each.width_m * np.array([1, -1, -1, 1])
-    cos, sin = np.cos(each.heading_rad), np.sin(each.heading_rad)
-    return np.stack((each.x_m + along * cos - across * sin, each.y_m + along * sin + across * cos), axis=-1)
-
-
-def polygon(each: Box) -> shapely.Polygon:
-    return shapely.Polygon(ring(each))
-
-
 def segment(x1: float, y1: float, x2: float, y2: float) -> FloatArray:
     return np.array([[x1, y1], [x2, y2]])
 
@@ -58,12 +48,12 @@ def touch(a: Box, b: Box) -> bool:
 @settings(max_examples=300, deadline=None)
 @given(BOXES, BOXES)
 def test_boxes__distance_and_touch_are_shapelys(a: Box, b: Box) -> None:
-    distance = polygon(a).distance(polygon(b))
+    distance = polygon_of(a).distance(polygon_of(b))
     assert box_distance(a, b) == pytest.approx(distance, abs=1e-6)
     assert box_distance(b, a) == pytest.approx(distance, abs=1e-6)
     if distance > 1e-6:
         assert not touch(a, b)
-    elif polygon(a).intersection(polygon(b)).area > 1e-6:
+    elif polygon_of(a).intersection(polygon_of(b)).area > 1e-6:
         assert touch(a, b)
     assert touch(a, b) == touch(b, a) or distance < 1e-9
 
@@ -84,7 +74,7 @@ def test_nearest_box__is_the_least_distance_of_those_marked(own: list[Box], othe
     among = np.array([[[(p + b) % 2 == 0 for b in range(len(others))] for p in range(2)]])
     found = distance_to_nearest_box(players(*own), columns(*others), among, limit)
     for p in range(2):
-        distances = [polygon(own[p]).distance(polygon(b)) for k, b in enumerate(others) if among[0, p, k]]
+        distances = [polygon_of(own[p]).distance(polygon_of(b)) for k, b in enumerate(others) if among[0, p, k]]
         assert found[0, p] == pytest.approx(min([*distances, limit]), abs=1e-6)
 
 
@@ -95,7 +85,7 @@ def test_nearest_segment__is_the_least_distance_of_the_rows(
 ) -> None:
     segments = np.array([segment(*each) for each in ends])
     rows = np.arange(0, len(ends), 2)[None, None]  # every second segment
-    distances = [polygon(a).distance(shapely.LineString(segments[k])) for k in rows[0, 0]]
+    distances = [polygon_of(a).distance(shapely.LineString(segments[k])) for k in rows[0, 0]]
     found = distance_to_nearest_segment(players(a), segments, rows, limit)
     assert found[0, 0] == pytest.approx(min([*distances, limit]), abs=1e-6)
 
@@ -129,8 +119,8 @@ def test_time_to_contact__agrees_with_moving_the_box_in_small_steps(a: Box, b: B
     back = time_to_contact(b, a, -vx, -vy)
     assert found == pytest.approx(back, abs=1e-6) or min(found, back) > 1e3
     times = np.arange(0.0, 6.0, 0.02)
-    moved = shapely.polygons(ring(b) + times[:, None, None] * np.array([vx, vy]))
-    distance = shapely.distance(moved, polygon(a))
+    moved = shapely.polygons(shapely.get_coordinates(polygon_of(b)) + times[:, None, None] * np.array([vx, vy]))
+    distance = shapely.distance(moved, polygon_of(a))
     graze = 0.02 * np.hypot(vx, vy) + 1e-6  # a contact shorter than this can fall between two steps
     touching = np.flatnonzero(distance <= 0.0)
     if len(touching):

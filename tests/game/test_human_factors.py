@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.environments.arena import Arena, Seat
-from harness.game.arrays import BoolArray, FloatArray
+from harness.evaluation.rule_book.course import runs
+from harness.game.arrays import FloatArray
 from harness.game.human_factors import (
     NO_LIMITS,
     Attention,
@@ -225,16 +226,10 @@ def test_arena__limits_without_effect_equal_no_limits(arena: Arena, seed: int) -
 TEXTING = Attention(mean_attentive_s=10.0, lapse_s=(4.0, 6.0), bump_steering_sd_rad=0.01)
 
 
-def runs(lapsed: BoolArray) -> list[tuple[int, int]]:
-    """First step and length of every lapse."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], lapsed.astype(int), [0]))))
-    return [(int(first), int(end - first)) for first, end in edges.reshape(-1, 2)]
-
-
 def test_lapses__have_their_mean_length_and_rate() -> None:
     # an attentive stretch of 10 s on average and a lapse of 5 s: a third of the time, one lapse in 15 s
     lapses = draw_lapses(TEXTING, 200_000, 0.1, np.random.default_rng(2))
-    lengths = [length for _, length in runs(lapses.lapsed)]
+    lengths = [last - first + 1 for first, last in runs(lapses.lapsed)]
     assert np.mean(lengths) == pytest.approx(50.0, abs=5 * 0.2)  # uniform over 4..6 s: 5.8 / sqrt(1300) steps
     assert lapses.lapsed.mean() == pytest.approx(1.0 / 3.0, abs=0.03)
     assert len(lengths) == pytest.approx(20_000.0 / 15.0, rel=0.1)
@@ -254,8 +249,8 @@ def test_lapses__the_first_may_occur_at_any_time_of_a_game() -> None:
 def test_lapses__each_has_one_steering_angle() -> None:
     lapses = draw_lapses(TEXTING, 50_000, 0.1, np.random.default_rng(3))
     angles = []
-    for first, length in runs(lapses.lapsed):
-        within = lapses.steering_rad[first : first + length]
+    for first, last in runs(lapses.lapsed):
+        within = lapses.steering_rad[first : last + 1]
         assert (within == within[0]).all()
         angles.append(within[0])
     assert not lapses.steering_rad[~lapses.lapsed].any()
@@ -276,7 +271,8 @@ def test_lapses__are_apart_and_within_the_range(
 ) -> None:
     attention = Attention(mean_attentive_s=mean, lapse_s=(shortest, shortest + more))
     lapses = draw_lapses(attention, 400, step, np.random.default_rng(seed))
-    for first, length in runs(lapses.lapsed):
+    for first, last in runs(lapses.lapsed):
+        length = last - first + 1
         assert length <= max((shortest + more) / step + 0.5 + 1e-9, 1)
         if 0 < first < 400 - length:  # not cut off by the start or the end of the game
             assert length >= max(shortest / step - 0.5 - 1e-9, 1)

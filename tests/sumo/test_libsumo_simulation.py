@@ -171,16 +171,6 @@ def test_reset__removes_all_vehicles_of_the_previous_game(
         assert set(libsumo.vehicle.getIDList()) == expected
 
 
-def test_remove__the_player_is_removed_and_the_other_drives_on(scene: OpenScene, opened: Open) -> None:
-    simulation = opened((HARNESS, SUMO))
-    start = placed(scene, (40, RIGHT_Y, 0, 10), (40, LEFT_Y, 0, 10))
-    simulation.reset(0, start, [])
-    step(simulation, start)
-    simulation.remove(0, 0)
-    step(simulation, start)
-    assert libsumo.vehicle.getIDList() == ("non_ego",)
-
-
 def test_halt__a_player_that_sumo_drove_stands_at_the_given_pose(scene: OpenScene, opened: Open) -> None:
     simulation = opened((HARNESS, SUMO))
     start = placed(scene, (40, RIGHT_Y, 0, 10), (40, LEFT_Y, 0, 10))
@@ -196,15 +186,6 @@ def test_halt__a_player_that_sumo_drove_stands_at_the_given_pose(scene: OpenScen
 
 
 # --- background traffic------------------------------------------------------------------------------------------------
-
-
-def test_background__departs_at_its_time_and_is_read_from_then_on(busy: OpenScene, opened: Open) -> None:
-    simulation = opened(on=busy)
-    start = placed(busy, (40, LEFT_Y, 0, 0), None)
-    simulation.reset(0, start, [other("early"), other("late", 0.3, "0", "50")])
-    readings = [step(simulation, start) for _ in range(5)]
-    assert [each.names[0].tolist() for each in readings] == [["early"]] * 3 + [["early", "late"]] * 2
-    assert all(each.present.all() for each in readings)
 
 
 def test_background__waits_while_a_player_blocks_the_insertion(busy: OpenScene, opened: Open) -> None:

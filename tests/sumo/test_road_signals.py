@@ -21,7 +21,7 @@ from harness.game.junctions import Signal
 from harness.game.roles import EGO, NON_EGO
 from harness.road.scene.open_scene import OpenScene
 from harness.sumo.libsumo_simulation import LibsumoSimulation
-from tests.support.scenes import CROSSING_EDGES, CROSSING_NODES, build_scene, drawn
+from tests.support.scenes import CROSSING, CROSSING_EDGES, CROSSING_NODES, build_scene, drawn
 
 CYCLE_S, STEP_S = 90.0, 0.1
 LIGHTS = CROSSING_NODES.replace('id="c" x="0" y="0" type="priority"', 'id="c" x="0" y="0" type="traffic_light"')
@@ -32,9 +32,8 @@ Open = Callable[..., LibsumoSimulation]
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
-    places = {"ego": ("wc ce", "wc_0"), "non_ego": ("sc ce", "sc_0"), "goal": "ce"}
     folder = tmp_path_factory.mktemp("scenes") / "lights"
-    return build_scene(folder, LIGHTS, CROSSING_EDGES, places, goal_m=50.0, time_limit_s=100.0)
+    return build_scene(folder, LIGHTS, CROSSING_EDGES, CROSSING, goal_m=50.0, time_limit_s=100.0)
 
 
 @pytest.fixture

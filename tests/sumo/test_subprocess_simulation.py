@@ -8,7 +8,6 @@ import pickle
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -29,6 +28,7 @@ from harness.sumo.subprocess_simulation import SubprocessSimulation, open_simula
 from tests.support.processes import is_running
 from tests.support.repository import REPOSITORY
 from tests.support.scenes import LEFT_Y, ZIPPER, ZIPPER_EDGES, ZIPPER_NODES, build_scene, drawn, placed
+from tests.support.tiny import wait_for
 
 FLOW = '<flow id="f" type="van" begin="0" period="3" departLane="random"><route edges="road"/></flow>'
 
@@ -42,13 +42,6 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
 def far(scene: OpenScene) -> Iterator[SubprocessSimulation]:
     with closing(SubprocessSimulation(scene, 1, (True, True), 1)) as simulation:
         yield simulation
-
-
-def ends(process: int, within_s: float = 300.0) -> bool:
-    until = time.monotonic() + within_s
-    while is_running(process) and time.monotonic() < until:
-        time.sleep(0.02)
-    return not is_running(process)
 
 
 def test_open__one_simulation_at_a_time_is_local(scene: OpenScene) -> None:
@@ -194,7 +187,7 @@ def test_parent__a_script_without_a_main_guard_leaves_no_orphan(scene: OpenScene
         [sys.executable, str(script)], cwd=scene.folder.parent, capture_output=True, text=True, timeout=300
     )
     assert run.stdout.strip().isdigit(), run.stderr
-    assert ends(int(run.stdout))
+    wait_for(lambda: not is_running(int(run.stdout)), "the end of the child")
     assert run.returncode == 0 or end
 
 

@@ -35,6 +35,7 @@ CROSSING_EDGES = "".join(
     f'<edge id="{a}{b}" from="{a}" to="{b}" numLanes="1" speed="13.89" spreadType="right" priority="{priority}"/>'
     for a, b, priority in (("w", "c", 2), ("c", "e", 2), ("s", "c", 1), ("c", "n", 1))
 )
+CROSSING = {"ego": ("wc ce", "wc_0"), "non_ego": ("sc ce", "sc_0"), "goal": "ce"}
 
 ZIPPER_NODES = '<node id="a" x="0" y="0"/><node id="z" x="150" y="0" type="zipper"/><node id="b" x="300" y="0"/>'
 ZIPPER_EDGES = (
