@@ -114,7 +114,6 @@ def _handlers_kept() -> Iterator[None]:
 
 _POLL_S = 0.25
 _LOOK_EVERY_S = 5.0  # for nodes that joined
-_END_S = 10.0
 
 
 class Inbox:
@@ -213,10 +212,8 @@ class RayWorkers:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        for ref in self._tasks:
-            self._ray.cancel(ref, force=True)
-        if self._tasks:
-            self._ray.wait(list(self._tasks), num_returns=len(self._tasks), timeout=_END_S)
+        """Tasks that still run end when the command leaves the cluster: Ray ends its workers. `ray.cancel` is not
+        called: Ray aborts the whole process where a task ends at the same moment."""
         self._tasks.clear()
         self._ray.kill(self._inbox)
 
