@@ -40,9 +40,10 @@ class Training(Document):
     network: list[Annotated[int, Field(ge=1, le=1024)]] = Field([64, 64], min_length=1, max_length=6)
     """Sizes of the hidden layers of the actor, and of the critic."""
     demonstration_steps: int = Field(38_400, ge=0, le=10_000_000)
-    """Steps, over all games, in which a rule-based driver (adaptive cruise control and lane keeping) shows a new ego
+    """Steps, over all games, in which a rule-based driver (adaptive cruise control and lane keeping) shows a new policy
     how to drive; at most a fifth of `steps`. The policy imitates it before its training, and the critic learns the
-    payoffs of these games. 0: the policy begins with random parameters, as those of people do."""
+    payoffs of these games. A person is shown its route alone: what it does about other players it learns from its
+    payoff. On foot there is no demonstration. 0: the policy begins with random parameters."""
     initial_deviation: float = Field(0.25, gt=0.0, le=2.0)
     """Standard deviation of the actions of a new policy. With a wide deviation nearly all games end at the rail at
     first, and the player learns to stand still, or to crash early, before it learns to drive. People on foot, who
@@ -93,9 +94,6 @@ class NonEgoTraining(Document):
 
     alone_share: float = Field(0.7, ge=0.0, le=1.0)
     """Share of games without the ego: people mostly learn to drive on roads with no car beside them."""
-    imitation: bool = False
-    """Let the new policies of people imitate the rule-based driver as well (`training.demonstration_steps`). Some of
-    its courtesy stays in what they learn afterwards."""
 
 
 class Retraining(Document):

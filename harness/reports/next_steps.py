@@ -42,24 +42,14 @@ def _finish(tables: RunTables) -> Iterator[NextStep]:
 
 
 def to_learn(tables: RunTables) -> Iterator[NextStep]:
-    """What helps players that did not learn to drive the scene, so that the questions are answered. People on foot have
-    no rule-based driver to imitate."""
-    unable = [name for name, each in tables.stages.items() if each.get("stopped") == DID_NOT_LEARN]
-    if not unable:
+    """What helps players that did not learn to drive the scene, so that the questions are answered."""
+    if all(each.get("stopped") != DID_NOT_LEARN for each in tables.stages.values()):
         return
-    campaign = tables.campaign
-    people = [each for each in tables.personas if any(name.startswith(f"{each}-seed") for name in unable)]
-    if people and tables.non_ego_drives and not campaign.get("non_ego_training", {}).get("imitation"):
-        yield NextStep(
-            sentence=f"{' and '.join(people)} did not learn to drive here. Let people imitate a rule-based driver "
-            "before their training: add this to the campaign, and run it again.",
-            command="[non_ego_training]\nimitation = true",
-        )
     if tables.manifest.get("quick"):
         sentence = "With --quick, players train for a small part of the budget. Train them for all of it."
         yield NextStep(sentence=sentence, command=command_of({**tables.manifest, "quick": False}))
     else:
-        steps = 2 * int(campaign.get("training", {}).get("steps", Training().steps))
+        steps = 2 * int(tables.campaign.get("training", {}).get("steps", Training().steps))
         sentence = "Double the budget of the trainings: change this in the campaign, and run it again."
         yield NextStep(sentence=sentence, command=f"[training]\nsteps = {steps}")
     yield NextStep(

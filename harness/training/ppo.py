@@ -23,6 +23,7 @@ from harness.drivers.policy_file import Policy
 from harness.environments.vector_env import Finished, JoinedVecEnv
 from harness.game.observation_layout import OF_OTHERS
 from harness.game.outcome import Outcome
+from harness.game.roles import EGO
 from harness.game.seeding import seed_of
 from harness.training.checkpoint import CurvePoint, Progress, read_checkpoint, write_checkpoint
 from harness.training.compiled_ppo import CompiledPPO
@@ -134,7 +135,11 @@ def _initial_deviation(spec: TrainingSpec) -> float:
 
 
 def _imitate(spec: TrainingSpec, model: PPO, environment: JoinedVecEnv) -> None:
+    """Let a new policy imitate a rule-based driver, people alone: an ego that learns to yield as well learns sooner,
+    and a person must not have a courtesy that its payoff does not ask for."""
     steps = min(spec.settings.demonstration_steps, spec.settings.steps // 5)
+    is_ego = spec.places[0].player == EGO
+    sample(spec if is_ego else replace(spec, alone_share=1.0), environment, 0, *spec.parts)
     seed = seed_of(*spec.parts, "demonstration") % 2**31
     try:
         imitate(model, environment, steps=steps, deviation=_initial_deviation(spec), seed=seed)

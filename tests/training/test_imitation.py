@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from harness.config.training import Training
+from harness.drivers.mixture import mixture_of
 from harness.drivers.policy_file import Policy
-from harness.game.roles import NON_EGO
+from harness.drivers.sumo import SumoDriver
+from harness.game.roles import EGO, NON_EGO
 from harness.road.scene.open_scene import OpenScene, open_scene
 from harness.training.imitation import returns_of
 from tests.support.tiny import settings
@@ -42,20 +44,37 @@ def test_imitation__a_new_policy_makes_the_turn(left_turn: OpenScene, tmp_path: 
     assert failures(left_turn, not_shown, demonstration_steps=0) > 0.6
 
 
-def first_policy(scene: OpenScene, folder: Path, learner: int, demonstration_steps: int) -> Policy:
-    """The policy with which a training begins."""
+def first_policy(
+    scene: OpenScene, folder: Path, *, learner: int, demonstration_steps: int, alone_share: float = 1.0
+) -> Policy:
+    """The policy with which a training begins, beside SUMO's driver in a share of its games."""
     folder.mkdir()
     chosen = settings(
         steps=1024, learning_rate=NO_LEARNING, demonstration_steps=demonstration_steps, final_deviation=0.5
     )
     spec = naive_ego(scene)
-    return in_one_go(beside(spec, learner, None, settings=chosen), folder).policy
+    other = mixture_of(SumoDriver(), spec.persona)
+    return in_one_go(beside(spec, learner, other, settings=chosen, alone_share=alone_share), folder).policy
+
+
+@pytest.mark.parametrize(("learner", "is_the_same"), [(NON_EGO, True), (EGO, False)])
+def test_imitation__a_person_is_shown_its_route_alone(
+    learner: int, is_the_same: bool, repository: Path, tmp_path: Path
+) -> None:
+    """Whatever the share of games with another player, of which only an ego sees the demonstrator's reaction."""
+    merge = open_scene(repository / "networks" / "merge")
+    alone, beside_sumo = (
+        first_policy(merge, tmp_path / str(share), learner=learner, demonstration_steps=200, alone_share=share).tensors
+        for share in (1.0, 0.0)
+    )
+    same = [np.allclose(tensor, beside_sumo[name], atol=1e-4) for name, tensor in alone.items()]
+    assert all(same) == is_the_same
 
 
 def test_imitation__a_learner_on_foot_has_no_demonstrator(repository: Path, tmp_path: Path) -> None:
     crossing = open_scene(repository / "networks" / "crossing")
     shown, not_shown = (
-        first_policy(crossing, tmp_path / str(steps), NON_EGO, demonstration_steps=steps).tensors
+        first_policy(crossing, tmp_path / str(steps), learner=NON_EGO, demonstration_steps=steps).tensors
         for steps in (0, 10_000)
     )
     for name, tensor in shown.items():

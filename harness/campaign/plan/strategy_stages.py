@@ -40,7 +40,7 @@ from harness.evaluation.strategies import (
     player_of,
     strategy_name,
 )
-from harness.game.roles import EGO, NON_EGO
+from harness.game.roles import NON_EGO
 
 
 def ego_learns(campaign: Campaign) -> bool:
@@ -134,13 +134,10 @@ class SeedStages:
 def training_settings(campaign: Campaign, stage: TrainingStage) -> Training:
     """The settings of one training, with its budget.
 
-    A person has no demonstrator, unless the campaign says so. A best response has a budget of its own. A training
-    that meets one of several personas in each game has the budget, and the segment length by which its learning curve
-    is judged, times their number.
+    A best response has a budget of its own. A training that meets one of several personas in each game has the budget,
+    and the segment length by which its learning curve is judged, times their number.
     """
     settings = campaign.training
-    if stage.learner != EGO and not campaign.non_ego_training.imitation:
-        settings = settings.model_copy(update={"demonstration_steps": 0})
     if stage.is_best_response:
         assert campaign.best_response is not None
         return settings.model_copy(update={"steps": campaign.best_response.steps})

@@ -206,14 +206,6 @@ def test_settings__several_people_in_one_place_multiply_the_budget() -> None:
         assert training_settings(campaign, stages[name]) == once  # of one person's strategies it meets one
 
 
-@pytest.mark.parametrize("imitation", [False, True])
-def test_settings__a_person_has_a_demonstrator_only_if_the_campaign_says_so(imitation: bool) -> None:
-    changes = {"non_ego_training": {"imitation": imitation}}
-    campaign, stages = campaign_of("anna", **changes), stages_of("anna", **changes)
-    steps = [training_settings(campaign, stages[name]).demonstration_steps for name in ("naive", "anna")]
-    assert steps == [38_400, 38_400 if imitation else 0]
-
-
 # --- all egos against all people ---------------------------------------------------------------
 
 
