@@ -22,11 +22,10 @@ from harness.road.scene.load_check import check_loads
 from harness.road.scene.open_scene import open_scene
 
 _SCRATCH = ".part"
-_ON_ROADS = ("speedy", "distracted")
-_PERSONAS = {
-    CandidateKind.MERGE: _ON_ROADS,
-    CandidateKind.LANE_END: _ON_ROADS,
-    CandidateKind.FOLLOWING: _ON_ROADS,
+_PERSONAS = {  # none that lets go of the wheel, as `distracted` does: it leaves every road that bends
+    CandidateKind.MERGE: ("speedy", "late_merger"),
+    CandidateKind.LANE_END: ("speedy", "late_merger"),
+    CandidateKind.FOLLOWING: ("speedy", "tailgater"),
     CandidateKind.ZEBRA: ("jaywalker", "phone_walker"),
 }
 _EGO_WAITS = (CandidateKind.ZEBRA, CandidateKind.FOLLOWING)  # for the non-ego, which is before it or has priority
