@@ -111,6 +111,24 @@ def test_deed__of_the_other_road_user(other: list[dict[str, Any]], deed: str, me
     assert cause(merge, ego(), other)["deed"] == deed
 
 
+STANDING = along(74.0, -4.8, 0.0, 0.0, 61)
+SLOWING = [*along(52.0, -4.8, 0.0, 4.0, 55), *along(74.0, -4.8, 0.0, 0.0, 6)]
+
+
+@pytest.mark.parametrize(
+    ("poses", "ended", "deed"),
+    [
+        (STANDING, 5, "stands at the edge of the road, which it touched before"),
+        (SLOWING, 55, "stands in the ego's lane"),  # 0.5 s before contact, when the ego was in danger already
+    ],
+)
+def test_stands__a_person_that_touched_the_edge_before_the_danger(
+    poses: list[Pose], ended: int, deed: str, merge: Any
+) -> None:
+    person = [row | {"outcome": "rail" if k >= ended else ""} for k, row in enumerate(rows("non_ego", poses))]
+    assert cause(merge, ego(poses=along(10.0, -4.8, 0.0, 10.0, 61)), person)["deed"] == deed
+
+
 def test_oncoming__the_danger_lasts_from_the_start(merge: Any) -> None:
     # the centres are 45 m apart and close at 20 m/s: 40 m between the bumpers, so danger in all 2 s
     oncoming = rows("non_ego", along(65.0, -4.8, 2 * NORTH, 10.0, STEPS))

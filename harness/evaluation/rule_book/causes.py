@@ -9,7 +9,7 @@ The rules, in order:
 2. The event is the other's last entry into the ego's lane (`lane_entries`), if it began within `SINCE_S` of the end; or
    the ego's change into the other's lane. A body that was in the ego's lane before brakes, stands or goes on ahead,
    comes towards the ego, or hits it from behind: that begins with the last stretch at a time to collision of at most
-   `DANGER_TTC_S`.
+   `DANGER_TTC_S`. So does a player that had touched the edge of the road before that stretch, and stands there.
 3. A rule of the road that the other broke in that time is the event instead, and is named with it. One that the ego
    broke is named besides.
 4. The ego saw it if in some step from then to the end it was not in a lapse of attention and nothing hid the other.
@@ -113,10 +113,12 @@ def _subject(course: Course, other: int) -> str:
 
 def _event(course: Course, other: int, last: int) -> _Event:
     """What the other did about the ego's lane, or the ego about the other's."""
-    lane = in_lane(course, other, EGO)
+    lane, danger = in_lane(course, other, EGO), _danger(course, other, last)
+    if _left_the_road(course, other, danger):
+        return _Event(danger, "stands", "stands at the edge of the road, which it touched before")
     first = max(last - course.steps(at.SINCE_S), 0)
     if not lane.inside[last]:
-        return _Event(_danger(course, other, last), "leaves_lane", "the ego leaves its lane towards it")
+        return _Event(danger, "leaves_lane", "the ego leaves its lane towards it")
     outside = np.flatnonzero(~lane.inside[first:last])
     entered = first + int(outside[-1]) + 1 if len(outside) else 0
     if len(outside) and lane.changes_lane(entered):
@@ -125,7 +127,15 @@ def _event(course: Course, other: int, last: int) -> _Event:
         if first < span.first <= last:
             return _Event(span.first, name, words_of(name, lane.side(span.first)))
     name, words = _in_lane(course, other, last)
-    return _Event(_danger(course, other, last), name, words)
+    return _Event(danger, name, words)
+
+
+def _left_the_road(course: Course, other: int, step: int) -> bool:
+    """Whether a body is a player that had touched the edge of the road before a step, and stood there since."""
+    if other >= course.drove.shape[1] or course.game.outcomes[other] is not Outcome.RAIL:
+        return False
+    ended = course.game.last_step(other)
+    return ended is not None and ended < step
 
 
 def _drifts_beside(course: Course, last: int) -> tuple[int | None, _Event | None]:
