@@ -66,9 +66,10 @@ def show_persona(
     file = document_at(file, "personas")
     profile = persona_profile(read_document(file, Persona))
     if html is not None:
-        from harness.reports.persona.persona_page import write_profile
+        from harness.reports.page_template import write_page
+        from harness.reports.persona.persona_page import render_profile
 
-        write_profile(profile, html)
+        write_page(html, render_profile(profile))
     console = console_of_any_encoding()
     show(profile, console)
     if html is not None:

@@ -16,10 +16,11 @@ from harness.game.roles import roles_of
 from harness.shipped_documents import document_at
 
 if TYPE_CHECKING:
+    from junitparser import TestCase
+
     from harness.campaign.execution.pinned_games import Pinned
     from harness.campaign.execution.regression import PlayedAgain
     from harness.config.pinned_game import PinnedGame
-    from harness.reports.junit import JUnitCase
 
 _LEAST_SHOWN = 0.005
 
@@ -136,20 +137,14 @@ def _played_again(played: PlayedAgain) -> str:
     return f"{word}  {plain(played.name)}{why}  ({played.seconds:.1f} s)"
 
 
-def _case_of(played: PlayedAgain) -> JUnitCase:
-    from harness.reports.junit import JUnitCase
+def _case_of(played: PlayedAgain) -> TestCase:
+    from harness.reports.junit import case_of
 
     game = played.game
     failure = "" if played.passed or played.error else f"the ego fails: {played.outcome}"
     details = f"arm {game.arm}, seed {game.seed}, game {game.episode}; {game.found_with} failed by {game.outcome}"
-    return JUnitCase(
-        name=played.name,
-        group=f"regression.{game.arm}",
-        failure=failure,
-        error=played.error,
-        details=details,
-        seconds=played.seconds,
-    )
+    group = f"regression.{game.arm}"
+    return case_of(played.name, group, failure=failure, error=played.error, details=details, seconds=played.seconds)
 
 
 def _changes(game: PinnedGame) -> Iterator[str]:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 
@@ -13,40 +12,27 @@ from harness.errors import plain
 from harness.files import write_atomically
 
 
-@dataclass(frozen=True, kw_only=True)
-class JUnitCase:
-    """One check and its outcome. At most one of `failure` and `error` is given; without any it passed."""
-
-    name: str
-    group: str
-    """What it belongs to: a dotted name, by which CI systems group checks."""
-    failure: str = ""
-    """Why it failed, in one sentence."""
-    error: str = ""
-    """Why it could not be carried out."""
-    details: str = ""
-    """Further lines, such as the figures that were compared."""
-    seconds: float = 0.0
+def case_of(
+    name: str, group: str, *, failure: str = "", error: str = "", details: str = "", seconds: float = 0.0
+) -> TestCase:
+    """A check and its outcome; `group` is a dotted name, by which CI systems group checks. `failure` says in a sentence
+    why it failed, `error` why it could not be carried out: at most one is given. `details` are further lines."""
+    case = TestCase(plain(name), plain(group), seconds)
+    case.result = [kind(plain(message)) for kind, message in ((Failure, failure), (Error, error)) if message]
+    if details:
+        case.system_out = "\n".join(plain(line) for line in details.splitlines())
+    return case
 
 
 def write_junit(
-    file: Path, suite: str, checks: Sequence[JUnitCase], properties: Mapping[str, str] = MappingProxyType({})
+    file: Path, suite: str, checks: Iterable[TestCase], properties: Mapping[str, str] = MappingProxyType({})
 ) -> None:
     """Write a suite of checks. `properties` are facts of the whole suite, such as versions. Raises OSError."""
     report, tests = JUnitXml(plain(suite)), TestSuite(plain(suite))
     for name, value in properties.items():
         tests.add_property(plain(name), plain(value))
     for check in checks:
-        tests.add_testcase(_case(check))
+        tests.add_testcase(check)
     report.add_testsuite(tests)
     report.update_statistics()
     write_atomically(file, report.tostring())
-
-
-def _case(check: JUnitCase) -> TestCase:
-    case = TestCase(plain(check.name), plain(check.group), check.seconds)
-    kinds = ((Failure, check.failure), (Error, check.error))
-    case.result = [kind(plain(message)) for kind, message in kinds if message]
-    if check.details:
-        case.system_out = "\n".join(plain(line) for line in check.details.splitlines())
-    return case

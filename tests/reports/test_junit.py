@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from xml.etree import ElementTree
 
-from harness.reports.junit import JUnitCase, write_junit
+from harness.reports.junit import case_of, write_junit
 
 CHECKS = [
-    JUnitCase(name="failure rate", group="merge.speedy", seconds=1.5, details="at most 0.2\nfound 0.1"),
-    JUnitCase(name="near misses", group="merge.speedy", failure="12 of 100, more than 5"),
-    JUnitCase(name="speed", group="merge.speedy", error="no game was played"),
+    case_of("failure rate", "merge.speedy", seconds=1.5, details="at most 0.2\nfound 0.1"),
+    case_of("near misses", "merge.speedy", failure="12 of 100, more than 5"),
+    case_of("speed", "merge.speedy", error="no game was played"),
 ]
 
 
@@ -37,6 +37,6 @@ def test_write_junit__says_what_passed_and_why_the_rest_did_not(tmp_path: Path) 
 
 
 def test_write_junit__characters_that_xml_forbids_are_escaped(tmp_path: Path) -> None:
-    write_junit(tmp_path / "junit.xml", "a\x00b", [JUnitCase(name="<&\x1b", group="x", failure="\ud800")])
+    write_junit(tmp_path / "junit.xml", "a\x00b", [case_of("<&\x1b", "x", failure="\ud800")])
     (case,) = suite_in(tmp_path / "junit.xml").iter("testcase")
     assert case.get("name") == "<&\\x1b"

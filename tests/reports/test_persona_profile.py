@@ -15,8 +15,9 @@ from harness.config.toml_reading import read_document
 from harness.errors import UsageError
 from harness.game.human_factors import Attention, draw_lapses
 from harness.game.payoff_terms import GROUPS, TERMS
+from harness.reports.page_template import write_page
 from harness.reports.persona.drives import DRIFT_SPEED_MPS, drift_m, free_share, lapsed_share, lapses_per_minute
-from harness.reports.persona.persona_page import render_profile, write_profile
+from harness.reports.persona.persona_page import render_profile
 from harness.reports.persona.persona_terminal import show
 from harness.reports.persona.profile import (
     AFTER_A_LAPSE,
@@ -217,16 +218,17 @@ def test_page__is_not_written_over_a_document(tmp_path: Path) -> None:
     file = tmp_path / "anna.toml"
     file.write_text("mine")
     with pytest.raises(UsageError, match=r"must end with \.html"):
-        write_profile(invented(), file)
+        write_page(file, render_profile(invented()))
     assert file.read_text() == "mine"
     with pytest.raises(UsageError, match="there is no folder"):
-        write_profile(invented(), tmp_path / "no" / "anna.html")
+        write_page(tmp_path / "no" / "anna.html", render_profile(invented()))
 
 
 def test_page__opens_in_dark_and_light_loads_nothing_and_does_not_scroll_sideways(browser: Any, tmp_path: Path) -> None:
     file = tmp_path / "profile.html"
     fuzzy = read_document(SPEEDY, Persona).model_dump(exclude_none=True)["human"]
-    write_profile(invented(human=fuzzy, attention={"mean_attentive_s": 5.0, "lapse_s": [4.0, 6.0]}), file)
+    anna = invented(human=fuzzy, attention={"mean_attentive_s": 5.0, "lapse_s": [4.0, 6.0]})
+    write_page(file, render_profile(anna))
     with opener(browser, file) as open_page:
         for scheme in ("light", "dark"):
             page = open_page(color_scheme=scheme)

@@ -7,6 +7,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from junitparser import TestCase
+
 from harness.campaign.results.kept_results import RunResult
 from harness.campaign.results.shown_result import Verdicts
 from harness.campaign.storage.learned import did_not_learn
@@ -14,8 +16,8 @@ from harness.campaign.storage.manifest import FINISHED, FORMAT
 from harness.campaign.storage.run_folder import RunFolder
 from harness.evaluation.comparisons.acceptance_checks import Check
 from harness.files import write_atomically
-from harness.reports import junit
 from harness.reports.acceptance_wording import TITLES, sentence
+from harness.reports.junit import case_of, write_junit
 from harness.reports.numbers import NO_SPACE
 
 RESULT, JUNIT = "result.json", "junit.xml"
@@ -31,7 +33,7 @@ def write_ci_files(
     """Write `result.json` and `junit.xml`: the acceptance checks, and whether every stage was carried out."""
     properties = {"harness": str(manifest["versions"].get("harness", "")), "campaign": manifest["name"]}
     cases = [*map(_acceptance_case, checks or ()), *_stage_cases(manifest)]
-    junit.write_junit(folder.path / JUNIT, f"harness campaign {manifest['name']}", cases, properties)
+    write_junit(folder.path / JUNIT, f"harness campaign {manifest['name']}", cases, properties)
     document = {
         "format": FORMAT,
         "campaign": manifest["name"],
@@ -59,13 +61,13 @@ def _record(check: Check) -> dict[str, Any]:
     return {**record, **known, "passed": check.passed}
 
 
-def _acceptance_case(check: Check) -> junit.JUnitCase:
+def _acceptance_case(check: Check) -> TestCase:
     name, words = f"{TITLES[check.bound]}: {check.arm}, seed {check.seed}", sentence(check).replace(NO_SPACE, " ")
     group = f"acceptance.{check.persona}.{check.bound}"
-    return junit.JUnitCase(name=name, group=group, failure="" if check.passed else words, details=words)
+    return case_of(name, group, failure="" if check.passed else words, details=words)
 
 
-def _stage_cases(manifest: Mapping[str, Any]) -> list[junit.JUnitCase]:
+def _stage_cases(manifest: Mapping[str, Any]) -> list[TestCase]:
     cases = []
     for name, entry in manifest["stages"].items():
         finished = entry["status"] in FINISHED
@@ -73,5 +75,5 @@ def _stage_cases(manifest: Mapping[str, Any]) -> list[junit.JUnitCase]:
         if finished and entry.get("errors"):
             error = f"{entry['errors']} of {entry['episodes']} games could not be played"
         group, seconds = f"stages.{entry['kind']}", entry.get("seconds") or 0.0
-        cases.append(junit.JUnitCase(name=name, group=group, error=error, seconds=seconds))
+        cases.append(case_of(name, group, error=error, seconds=seconds))
     return cases

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 from markupsafe import Markup
 
 from harness.reports.figures import GRID, INK, SERIES, figure_of, svg
-from harness.reports.page_template import environment_of, write_page
+from harness.reports.page_template import environment_of
 from harness.reports.persona.drives import DRIVE_S, SampleDrive
 from harness.reports.persona.profile import (
     ATTENDS,
@@ -24,11 +23,6 @@ from harness.reports.persona.worth import PayoffFunction
 
 _COLOURS = [SERIES[name] for name in ("alone", "persona", "retrained", "sumo")]
 _LINES = ("-", "--", ":", "-.")
-
-
-def write_profile(profile: PersonaProfile, file: Path) -> None:
-    """Write the page. Raises UsageError when the file's name or folder is wrong."""
-    write_page(file, render_profile(profile))
 
 
 def render_profile(profile: PersonaProfile) -> str:
