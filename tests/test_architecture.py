@@ -44,7 +44,7 @@ ROOMS: dict[str, set[str]] = {
     "road.net": GROUND | {"road.xml"},
     "road.demand": GROUND | {"road.xml", "road.net"},
     "road.scene": GROUND | {"road.xml", "road.net", "road.demand"},
-    "maps": GROUND | {"road.xml", "road.net"},
+    "maps": GROUND | {"road.xml", "road.net", "road.demand"},
     "sumo": GROUND | ROAD,
     "replay": {"errors", "game", "sumo"} | ROAD | EVALUATION,
     "export": {"errors", "game", "replay"} | ROAD | EVALUATION,

@@ -3,11 +3,15 @@ complete before it gets its name."""
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from xml.etree import ElementTree
+
+from markupsafe import Markup
 
 from harness.assessment.route_trial import try_routes
 from harness.cli import messages
@@ -16,6 +20,7 @@ from harness.errors import Problem, SimulationError, UsageError, plain
 from harness.files import make_folder, write_atomically
 from harness.maps.candidates import CandidateKind
 from harness.maps.game_plans import GamePlan
+from harness.maps.map_traffic import SceneTraffic, scene_traffic
 from harness.maps.open_map import OpenMap, write_part
 from harness.road.net.network import KEPT_M
 from harness.road.scene.load_check import check_loads
@@ -93,8 +98,10 @@ def write_scenes(
 def _checked(opened: OpenMap, name: str, plan: GamePlan, folder: Path) -> Path:
     scene = folder / name
     scene.mkdir()
-    is_part = write_part(opened.net, opened.net_file, plan.edges, scene / f"{name}.net.xml")
-    for file, text in _scene_files(name, plan, opened, is_part=is_part).items():
+    net_file = scene / f"{name}.net.xml"
+    junctions = write_part(opened.net, opened.net_file, plan.edges, net_file, whole_net=opened.whole_net)
+    traffic = None if opened.traffic is None else scene_traffic(opened.traffic, opened.net, junctions)
+    for file, text in _scene_files(name, plan, opened, traffic, is_part=junctions is not None).items():
         (scene / file).write_text(text, encoding="utf-8")
     opened_scene = open_scene(scene)
     check_loads(opened_scene)
@@ -133,20 +140,26 @@ def _put(opened: OpenMap, ready: dict[str, tuple[Path, GamePlan]], out: Path) ->
             shutil.rmtree(each, ignore_errors=True)
 
 
-def _scene_files(name: str, plan: GamePlan, opened: OpenMap, *, is_part: bool) -> dict[str, str]:
+def _scene_files(
+    name: str, plan: GamePlan, opened: OpenMap, traffic: SceneTraffic | None, *, is_part: bool
+) -> dict[str, str]:
     """The texts of scene.toml and of the route file of a plan of a map, by the files' names. `is_part`: the scene's net
     is a part of the map."""
+    elements = [] if traffic is None else traffic.elements
     scene = rendered(
         "new_scene.toml.jinja",
         name=name,
         plan=plan,
         part_m=KEPT_M if is_part else None,
+        traffic_begin_s=None if traffic is None else math.floor(traffic.begin_s),
         time_limit_s=plan.time_limit_s(opened.reds_s),
         source=plain(opened.source.name),
         place=plain(opened.place_of(plan)),
         meaning=_MEANINGS[plan.candidate.kind],
     )
-    return {"scene.toml": scene, f"{name}.rou.xml": rendered("new_scene.rou.xml.jinja", in_xml=True, plan=plan)}
+    lines = [ElementTree.tostring(each, encoding="unicode").strip() for each in elements]
+    routes = rendered("new_scene.rou.xml.jinja", in_xml=True, plan=plan, traffic=[Markup(line) for line in lines])
+    return {"scene.toml": scene, f"{name}.rou.xml": routes}
 
 
 def _campaign_text(name: str, plan: GamePlan) -> str:

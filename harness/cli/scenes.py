@@ -143,6 +143,15 @@ def new_scene(
     left_hand: Annotated[
         bool, typer.Option("--left-hand", help="Traffic in the OpenStreetMap file keeps to the left.")
     ] = False,
+    routes: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="The map's own traffic: a .rou.xml, whose routes are cut to the scene's net."
+        ),
+    ] = None,
+    whole_net: Annotated[
+        bool, typer.Option("--whole-net", help="Scenes get the whole net and traffic, not the part near the players.")
+    ] = False,
     html: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Also write a page that draws the map with the conflicts.")
     ] = None,
@@ -166,7 +175,14 @@ def new_scene(
     console = console_of_any_encoding()
     with tempfile.TemporaryDirectory(prefix="harness-map-") as folder:
         with console.status(messages.reading(source)) as status:
-            opened = open_map(source, Path(folder), left_hand=left_hand, show=status.update)
+            opened = open_map(
+                source,
+                Path(folder),
+                left_hand=left_hand,
+                routes=routes,
+                whole_net=whole_net,
+                show=status.update,
+            )
         plans = _wanted(opened, kind, near, within)
         chosen = {name: plans[:_MOST_TRIED] if conflict is None else [_numbered(opened, conflict)]}
         if every:

@@ -1,4 +1,4 @@
-"""A map that was read: its net, the games that can be made on it, and the part of the net that a game needs."""
+"""A map that was read: its net, its traffic, the games that can be made on it, and the part that a game needs."""
 
 from __future__ import annotations
 
@@ -18,6 +18,8 @@ from harness.game.arrays import FloatArray
 from harness.game.junctions import SIGNALS, Signal
 from harness.maps.game_plans import GamePlan, Plans
 from harness.maps.import_map import import_map
+from harness.maps.map_traffic import read_traffic
+from harness.road.demand.route_file import RouteFile
 from harness.road.net.net_listing import ListedJunction, ListedLane, edges_near, listed_junctions, listed_lane
 from harness.road.net.network import car_lanes, junctions_near, lane_line
 from harness.road.net.tiles import write_tiles
@@ -36,6 +38,8 @@ class OpenMap:
     left_out: dict[str, int]  # reason and number of conflicts of which no scene can be made
     note: str  # what the conversion had to leave out; empty if nothing
     net: Net = field(repr=False)
+    whole_net: bool = False  # scenes get all of the net
+    traffic: RouteFile | None = field(default=None, repr=False)
 
     @cached_property
     def reds_s(self) -> dict[str, float]:
@@ -69,12 +73,21 @@ class OpenMap:
         return [listed_lane(lane) for edge in edges for lane in edge.getLanes()], listed_junctions(edges)
 
 
-def open_map(source: Path, folder: Path, *, left_hand: bool, show: Callable[[str], object] = str) -> OpenMap:
-    """Read a map, converted into `folder`; `show` gets a line on how far this is.
+def open_map(
+    source: Path,
+    folder: Path,
+    *,
+    left_hand: bool,
+    routes: Path | None = None,
+    whole_net: bool = False,
+    show: Callable[[str], object] = str,
+) -> OpenMap:
+    """Read a map, converted into `folder`, with the traffic of a route file; `show` gets a line on how far this is.
 
-    Raises UsageError for a map on which no game can be made.
+    Raises UsageError for a map on which no game can be made, and for a route file that does not fit it.
     """
     net_file, net, note = import_map(source, folder, left_hand=left_hand)
+    traffic = None if routes is None else read_traffic(routes, net_file, net, is_cut=not whole_net)
     plans = Plans(net, show)
     if not plans.all:
         reasons = "; ".join(f"{reason}: {count}" for reason, count in sorted(plans.left_out.items()))
@@ -87,6 +100,8 @@ def open_map(source: Path, folder: Path, *, left_hand: bool, show: Callable[[str
         plans=plans.all,
         left_out=plans.left_out,
         note=note,
+        whole_net=whole_net,
+        traffic=traffic,
     )
 
 
@@ -113,20 +128,22 @@ def _longest_s(logic: ElementTree.Element) -> float:
     return longest_s
 
 
-def write_part(net: Net, net_file: Path, routes: Collection[str], file: Path) -> bool:
+def write_part(
+    net: Net, net_file: Path, routes: Collection[str], file: Path, *, whole_net: bool = False
+) -> frozenset[str] | None:
     """Write the part of a net, which was read from `net_file`, that the games of a scene use: the junctions near the
-    edges `routes`, and their edges. Names and places stay. Returns whether anything was left out."""
-    junctions = junctions_near(net, {net.getEdge(name) for name in routes})
+    edges `routes`, and their edges. Names and places stay. Returns the junctions; None if all of the net is written."""
+    junctions = None if whole_net else junctions_near(net, {net.getEdge(name) for name in routes})
     if junctions is None:
         shutil.copyfile(net_file, file)
-        return False
+        return None
     write_tiles(net_file, file, prefixes=[""], offset_m=0.0, junctions=junctions)
     root = parse_xml(file)
     location = root.find("location")
     if location is not None:
         location.set("convBoundary", ",".join(f"{each:.2f}" for each in _boundary(root)))
     ElementTree.ElementTree(root).write(file, encoding="utf-8", xml_declaration=True)
-    return True
+    return junctions
 
 
 def _boundary(root: ElementTree.Element) -> list[float]:

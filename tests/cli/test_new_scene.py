@@ -175,6 +175,21 @@ def test_new__of_all_makes_a_scene_of_each_that_is_listed(tmp_path: Path, new: R
     assert folders == [f"t_{number}" for number in numbers]
 
 
+def test_new__a_scene_keeps_the_traffic_of_the_map(tmp_path: Path, new: Run) -> None:
+    routes = tmp_path / "own.rou.xml"
+    routes.write_text('<routes><flow id="cars" begin="3600.5" period="4" from="-1" to="-2"/></routes>')
+    options = ("--from", JUNCTION, "--routes", routes)
+    new("t", *options)
+    new("whole", *options, "--whole-net")
+    scenes = {name: open_scene(tmp_path / "out" / "networks" / name) for name in ("t", "whole")}
+    for scene in scenes.values():
+        assert scene.document.game_window_s[0] == 3600.0 + scene.document.warm_up_s
+        assert len(scene.departures(np.random.default_rng(1))) > 5
+    routes.write_text('<routes><trip id="x" depart="0" from="no" to="-1"/></routes>')
+    with pytest.raises(UsageError, match=r"own\.rou\.xml: x: the net has no edge 'no' \(name the route file"):
+        new("bad", *options)
+
+
 def test_new__a_list_writes_nothing_but_the_page(tmp_path: Path, new: Run) -> None:
     page = tmp_path / "map.html"
     new("t", "--from", JUNCTION, "--list", "--html", page)

@@ -25,7 +25,8 @@ from harness.config.scene import Scene
 from harness.errors import SimulationError, UsageError
 from harness.files import write_atomically
 from harness.game.seeding import between, generator_of, seed_of
-from harness.road.demand.route_file import Departure, Motion, RouteFile, traveller_element
+from harness.road.demand.route_file import Departure, Motion, RouteFile
+from harness.road.demand.route_writing import traveller_element
 from harness.road.xml.angles import heading_rad_of
 from harness.road.xml.sumo_program import cached_file, run_program
 from harness.road.xml.xml_file import parse_xml

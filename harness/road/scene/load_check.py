@@ -18,7 +18,7 @@ from xml.etree import ElementTree
 from harness.config.scene import SCENE_FILE
 from harness.errors import Problem, SimulationError, UsageError
 from harness.road.demand.departures import background_departures
-from harness.road.demand.route_file import traveller_element
+from harness.road.demand.route_writing import traveller_element
 from harness.road.scene.open_scene import OpenScene
 from harness.road.xml.sumo_program import run_program
 
