@@ -114,10 +114,11 @@ def drawing_of(
         f"{len(lanes)} lanes, {len(junctions)} junctions, {len(signals)} lanes with a signal, {len(numbers)} conflicts."
     )
     marks = [*signals, *numbers]
+    players: list[DrawnShape] = []
     if scene is not None:
-        shapes += _routes_and_goals(scene)
-        marks += _starts(scene)
-    return Drawing(title=title, summary=summary, shapes=shapes, marks=marks)
+        players, starts = list(_routes_and_goals(scene)), list(_starts(scene))
+        shapes, marks, players = [*shapes, *players], [*marks, *starts], [*players, *starts]
+    return Drawing(title=title, summary=summary, shapes=shapes, marks=marks, opens_on=players)
 
 
 def _kind(player: int) -> str:

@@ -43,11 +43,13 @@ class Drawing:
     summary: str
     shapes: Sequence[DrawnShape]
     marks: Sequence[DrawnShape] = ()
+    opens_on: Sequence[DrawnShape] = ()
+    """Those of them that fill the page at first; empty: all."""
 
     @property
     def view(self) -> str:
-        """The part of the plane that is drawn, for SVG."""
-        points = np.concatenate([shape.points for shape in (*self.shapes, *self.marks)])
+        """The part of the plane that is seen at first, for SVG."""
+        points = np.concatenate([shape.points for shape in self.opens_on or (*self.shapes, *self.marks)])
         (left, low), (right, high) = points.min(0) - _MARGIN_M, points.max(0) + _MARGIN_M
         return f"{left:.2f} {-high:.2f} {right - left:.2f} {high - low:.2f}"
 

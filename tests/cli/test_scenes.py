@@ -145,6 +145,27 @@ def test_show__writes_a_page_with_the_players_of_the_scene(tmp_path: Path, lines
     assert "goal of non_ego" in text
     assert text.count("start of ego") == 60
     assert not re.search(r"(src|href)=", text)
+    assert "<title>merge: net</title>" in text
+
+
+def test_show__the_page_of_a_scene_opens_on_its_routes(tmp_path: Path, lines_of: Run) -> None:
+    page = tmp_path / "merge.html"
+    lines_of("scene", "show", MERGE, "--html", page)
+    text = page.read_text(encoding="utf-8")
+    (left, _, width, _), *_ = (
+        [float(each) for each in view.split()] for view in re.findall(r'id="net" viewBox="([^"]+)"', text)
+    )
+    x_m = {
+        kind: [
+            float(x)
+            for points in re.findall(rf'class="{kind}[^"]*" points="([^"]+)"', text)
+            for x in re.findall(r"([-.\d]+),", points)
+        ]
+        for kind in ("(?:route|goal)", "lane")
+    }
+    ways, lanes = x_m.values()
+    assert (left, left + width) == pytest.approx((min(ways) - 15.0, max(ways) + 15.0))
+    assert max(lanes) > left + width, "the road goes on behind the goals"
 
 
 def test_check__of_a_scene_names_its_players(lines_of: Run) -> None:
