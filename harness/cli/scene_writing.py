@@ -153,6 +153,7 @@ def _scene_files(
         part_m=KEPT_M if is_part else None,
         traffic_begin_s=None if traffic is None else math.floor(traffic.begin_s),
         time_limit_s=plan.time_limit_s(opened.reds_s),
+        red_s=plan.longest_red_s(opened.reds_s),
         source=plain(opened.source.name),
         place=plain(opened.place_of(plan)),
         meaning=_MEANINGS[plan.candidate.kind],

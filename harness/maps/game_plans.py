@@ -100,12 +100,20 @@ class GamePlan:
     def time_limit_s(self, reds_s: Mapping[str, float]) -> float:
         """Time enough for both from their farthest starts, at the speed of the slowest, and for the longest red of each
         traffic light on their ways, by its id."""
-        starts = [(self.ego_route, self.ego)]
-        starts += [(self.person_route, self.person)] if self.person_route is not None else []
-        longest_s = max(_seconds(route, start.first_m, reds_s) for route, start in starts)
+        longest_s = max(_seconds(route, start.first_m, reds_s) for route, start in self._driven)
         if self.way is not None:
             longest_s = max(longest_s, shapely.LineString(self.way).length / _WALK_MPS[0])
         return float(np.clip(5.0 * np.ceil((longest_s + _SPARE_S) / 5.0), *_TIME_LIMITS_S))
+
+    def longest_red_s(self, reds_s: Mapping[str, float]) -> float:
+        """The longest red of a traffic light on their ways, of `reds_s` by its id; 0 without one."""
+        names = [name for route, start in self._driven for at_m, name in route.lights if at_m > start.first_m]
+        return max((reds_s.get(name, 0.0) for name in names), default=0.0)
+
+    @property
+    def _driven(self) -> list[tuple[PlannedRoute, Start]]:
+        person = [] if self.person_route is None else [(self.person_route, self.person)]
+        return [(self.ego_route, self.ego), *person]
 
 
 def _seconds(route: PlannedRoute, from_m: float, reds_s: Mapping[str, float]) -> float:

@@ -109,6 +109,16 @@ def test_write__scenes_of_other_kinds_are_in_order(town: OpenMap, tmp_path: Path
     assert [each.naive_training.alone_share for each in campaigns] == [1.0, 1.0]  # the ego need not wait
 
 
+def test_write__the_time_limit_names_the_red_that_it_waits_for(town: OpenMap, tmp_path: Path) -> None:
+    lit = next(plan for plan in town.plans if plan.candidate.with_signals)
+    assert lit.longest_red_s(town.reds_s) == 23.0
+    assert lit.longest_red_s({}) == 0.0
+    write_scenes(town, {"lit": [lit]}, tmp_path)
+    limit = f"time_limit_s = {lit.time_limit_s(town.reds_s)}"
+    line = f"{limit}    # a traffic light on the way is red for up to 23 s\n"
+    assert line in (tmp_path / "networks" / "lit" / "scene.toml").read_text(encoding="utf-8")
+
+
 def test_write__a_zebra_crossing_of_a_map_the_ego_must_yield(town: OpenMap, tmp_path: Path) -> None:
     zebra = next(plan for plan in town.plans if plan.candidate.kind is CandidateKind.ZEBRA)
     assert write_scenes(town, {"zebra": [zebra]}, tmp_path) == ({"zebra": zebra}, [])
