@@ -42,6 +42,21 @@ def test_person__has_the_type_the_size_and_the_places_of_sumo(tmp_path: Path) ->
     assert kind.vehicle_class == "pedestrian"
 
 
+def test_walk__along_a_named_route_has_its_edges(tmp_path: Path) -> None:
+    routes = read(tmp_path, '<route id="r" edges="a b"/>' + person('<walk route="r"/>'))
+    assert routes.vehicles["p"].edges == ("a", "b")
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [("q", "person p.walk: unknown route 'q'"), ("several", "person p.walk: 'several' is a routeDistribution")],
+)
+def test_walk__along_no_single_route_is_refused(name: str, message: str, tmp_path: Path) -> None:
+    several = '<routeDistribution id="several"><route id="r" edges="a"/><route id="s" edges="b"/></routeDistribution>'
+    with pytest.raises(UsageError, match=message):
+        read(tmp_path, several + person(f'<walk route="{name}"/>'))
+
+
 def test_flow__of_persons_has_the_rates_of_other_flows(tmp_path: Path) -> None:
     flow = '<personFlow id="f" begin="0" end="100" personsPerHour="360"><walk edges="a"/></personFlow>'
     drawn = read(tmp_path, flow).departures(set(), 25.0, np.random.default_rng(1))

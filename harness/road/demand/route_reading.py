@@ -63,7 +63,7 @@ def read_route_file(path: Path, *additional: Path) -> RouteFile:
     vehicles: dict[str, Departure] = {}
     flows: dict[str, Flow] = {}
     for element in elements:
-        read = partial(_person, path, element) if element.tag in PEOPLE else partial(_departure, path, element, named)
+        read = partial(_person if element.tag in PEOPLE else _departure, path, element, named)
         departure = collect(problems, partial(read, types))
         if departure is None:
             continue
@@ -138,7 +138,7 @@ def _departure(path: Path, element: ElementTree.Element, named: NamedRoutes, typ
     return replace(departure, choices=choices)
 
 
-def _person(path: Path, element: ElementTree.Element, types: Types) -> Departure:
+def _person(path: Path, element: ElementTree.Element, named: NamedRoutes, types: Types) -> Departure:
     """The person that an element describes, or the first one of its flow. It has one walk.
 
     libsumo inserts a person with the edges of its walk. Rides, stops and journeys by several means need vehicles and
@@ -154,9 +154,9 @@ def _person(path: Path, element: ElementTree.Element, types: Types) -> Departure
         message = f"has {len(walks) or 'no'} {'walks' if walks else 'walk'}, one is possible"
         raise UsageError.of(path, where, message, "give one walk over all edges")
     walk = walks[0]
-    edges, ends = tuple(walk.get("edges", "").split()), tuple(filter(None, (walk.get("from"), walk.get("to"))))
+    edges, ends = _walked(path, f"{where}.walk", walk, named), tuple(filter(None, (walk.get("from"), walk.get("to"))))
     if not edges and len(ends) != 2:
-        raise UsageError.of(path, f"{where}.walk", "has no edges", "give its edges, or from and to")
+        raise UsageError.of(path, f"{where}.walk", "has no edges", "give its edges, a route, or from and to")
     places = {"departPos": "0", "arrivalPos": "center"}
     for name, default in places.items():
         places[name] = text = walk.get(name, element.get(name, default))
@@ -181,6 +181,16 @@ def _person(path: Path, element: ElementTree.Element, types: Types) -> Departure
     )
 
 
+def _walked(path: Path, where: str, walk: ElementTree.Element, named: NamedRoutes) -> tuple[str, ...]:
+    """The edges that a walk names, by itself or by its route."""
+    if walk.get("route") is None:
+        return tuple(walk.get("edges", "").split())
+    choices = _named(path, where, walk, named)
+    if len(choices) > 1:
+        raise UsageError.of(path, where, f"{walk.get('route')!r} is a routeDistribution", "name one route")
+    return choices[0].edges
+
+
 def _name_and_type(path: Path, element: ElementTree.Element, types: Types, default: str) -> tuple[str, str]:
     """The name of an element in messages, and the type that it gives. Raises UsageError."""
     where = f"{element.tag} {required(path, element, 'id')}"
@@ -203,6 +213,11 @@ def _choices(path: Path, where: str, element: ElementTree.Element, named: NamedR
         return choices_in(path, several, named)
     if name is None and element.tag != "vehicle":
         return ()
+    return _named(path, where, element, named)
+
+
+def _named(path: Path, where: str, element: ElementTree.Element, named: NamedRoutes) -> tuple[RouteChoice, ...]:
+    """The routes of the name that an element gives."""
     name = required(path, element, "route")
     if name not in named.routes:
         raise UsageError.of(path, where, f"unknown route {name!r}", nearest(name, named.routes))

@@ -66,7 +66,7 @@ _KINDS = {
     "personFlow": _kind("walk param", _PERSON, "personsPerHour", _FLOW),
     "walk": _kind(
         "param",
-        "edges from to departPos arrivalPos speed",
+        "edges route from to departPos arrivalPos speed",
         "cost routeLength exitTimes started ended waitingTime",  # without effect
     ),
 }
@@ -107,7 +107,7 @@ _REFUSED: Mapping[str, tuple[str, str]] = {
     **_each_of(
         "walk",
         " ".join(f"{end}{kind}" for end in ("from", "to") for kind in ("Taz", "XY", "LonLat", "Junction"))
-        + " busStop trainStop parkingArea containerStop chargingStation route viaJunctions",
+        + " busStop trainStop parkingArea containerStop chargingStation viaJunctions",
         "is not supported",
         "give edges, or from and to",
     ),
