@@ -39,7 +39,7 @@ def test_terminal__names_each_training_that_did_not_learn_and_answers_no_questio
     text = " ".join(printed.split())
     assert "did not learn: speedy-seed1: alone it reaches its goal in" in text  # as soon as its arm was played
     assert "Did not learn: speedy-seed1: alone it reaches its goal in" in text  # and at the end
-    assert "To try: speedy did not learn to drive here." in text
+    assert "To try: Double the budget of the trainings" in text
     for question in ("RQ1", "RQ2"):
         assert f"speedy, {question}: {LABEL}" in text
     assert [word for word in ("converged", "significant", "p = ") if word in text] == []
