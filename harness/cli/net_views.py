@@ -113,12 +113,14 @@ def drawing_of(
     summary = (
         f"{len(lanes)} lanes, {len(junctions)} junctions, {len(signals)} lanes with a signal, {len(numbers)} conflicts."
     )
-    marks = [*signals, *numbers]
-    players: list[DrawnShape] = []
-    if scene is not None:
-        players, starts = list(_routes_and_goals(scene)), list(_starts(scene))
-        shapes, marks, players = [*shapes, *players], [*marks, *starts], [*players, *starts]
-    return Drawing(title=title, summary=summary, shapes=shapes, marks=marks, opens_on=players)
+    ways, starts = ([], []) if scene is None else (list(_routes_and_goals(scene)), list(_starts(scene)))
+    return Drawing(
+        title=title,
+        summary=summary,
+        shapes=[*shapes, *ways],
+        marks=[*signals, *numbers, *starts],
+        opens_on=[*ways, *starts],
+    )
 
 
 def _kind(player: int) -> str:

@@ -72,7 +72,7 @@ def train(
         progress = read_checkpoint(model, key, checkpoint)
         if progress is None:
             progress = Progress(segments=0, steps=0, segment_payoffs=[], curve=[], alone_games=[], alone_failures=[])
-            if spec.initial is None:
+            if spec.demonstration_steps:
                 _imitate(spec, model, environment)
         while (stopped := _stop_reason(spec, progress)) is None:
             on_start(progress.segments)
@@ -135,12 +135,11 @@ def _initial_deviation(spec: TrainingSpec) -> float:
 
 
 def _imitate(spec: TrainingSpec, model: PPO, environment: JoinedVecEnv) -> None:
-    """Let a new policy imitate a rule-based driver, people alone: an ego that learns to yield as well learns sooner,
-    and a person must not have a courtesy that its payoff does not ask for."""
-    steps = min(spec.settings.demonstration_steps, spec.settings.steps // 5)
-    is_ego = spec.places[0].player == EGO
-    sample(spec if is_ego else replace(spec, alone_share=1.0), environment, 0, *spec.parts)
-    seed = seed_of(*spec.parts, "demonstration") % 2**31
+    """Let a new policy imitate a rule-based driver. An ego is shown the games of its training, in which the driver also
+    yields; a person is shown its route alone, so that it has no courtesy that its payoff does not ask for."""
+    if spec.places[0].player != EGO:
+        sample(replace(spec, alone_share=1.0), environment, 0, *spec.parts)
+    steps, seed = spec.demonstration_steps, seed_of(*spec.parts, "demonstration") % 2**31
     try:
         imitate(model, environment, steps=steps, deviation=_initial_deviation(spec), seed=seed)
     except FloatingPointError as error:

@@ -53,6 +53,13 @@ class TrainingSpec:
     """Train with all human factors of the persona, as in assessment: a best response is computed under the limits under
     which it is assessed."""
 
+    @property
+    def demonstration_steps(self) -> int:
+        """Steps, over all games, that a rule-based driver shows: none of a policy that is given, and none on foot."""
+        drives = any(not self.scene.world.walks[place.player] for place in self.places)
+        shown = min(self.settings.demonstration_steps, self.settings.steps // 5)
+        return shown if drives and self.initial is None else 0
+
 
 def open_games(spec: TrainingSpec) -> JoinedVecEnv:
     """The games of a training; each of its places has an arena of its own. Raises SimulationError if SUMO fails."""

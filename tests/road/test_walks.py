@@ -48,13 +48,17 @@ def test_walk__along_a_named_route_has_its_edges(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "message"),
-    [("q", "person p.walk: unknown route 'q'"), ("several", "person p.walk: 'several' is a routeDistribution")],
+    ("walk", "message"),
+    [
+        ('route="q"', "unknown route 'q'"),
+        ('route="several"', "'several' is a routeDistribution"),
+        ('route="r" edges="a"', "has edges and a route"),
+    ],
 )
-def test_walk__along_no_single_route_is_refused(name: str, message: str, tmp_path: Path) -> None:
+def test_walk__along_no_single_route_is_refused(walk: str, message: str, tmp_path: Path) -> None:
     several = '<routeDistribution id="several"><route id="r" edges="a"/><route id="s" edges="b"/></routeDistribution>'
-    with pytest.raises(UsageError, match=message):
-        read(tmp_path, several + person(f'<walk route="{name}"/>'))
+    with pytest.raises(UsageError, match=f"person p.walk: {message}"):
+        read(tmp_path, several + person(f"<walk {walk}/>"))
 
 
 def test_flow__of_persons_has_the_rates_of_other_flows(tmp_path: Path) -> None:

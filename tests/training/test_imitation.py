@@ -71,6 +71,15 @@ def test_imitation__a_person_is_shown_its_route_alone(
     assert all(same) == is_the_same
 
 
+def test_demonstration__lasts_for_a_fifth_of_the_budget_at_most(left_turn: OpenScene, repository: Path) -> None:
+    spec = naive_ego(left_turn)
+    spec = replace(spec, settings=settings(steps=100_000, demonstration_steps=38_400))
+    assert spec.demonstration_steps == 20_000
+    assert replace(spec, settings=settings(steps=1_000_000, demonstration_steps=38_400)).demonstration_steps == 38_400
+    on_foot = beside(replace(spec, scene=open_scene(repository / "networks" / "crossing")), NON_EGO, None)
+    assert on_foot.demonstration_steps == 0
+
+
 def test_imitation__a_learner_on_foot_has_no_demonstrator(repository: Path, tmp_path: Path) -> None:
     crossing = open_scene(repository / "networks" / "crossing")
     shown, not_shown = (

@@ -100,5 +100,5 @@ def _policy_card(stage: TrainingStage, spec: TrainingSpec) -> dict[str, Any]:
         "people": len(spec.scene.document.non_ego),
         "against": " and ".join(map(description, stage.opponent)) or None,
         "began_from": stage.initial.stage if stage.initial is not None else None,
-        "training": spec.settings.model_dump(mode="json"),
+        "training": {**spec.settings.model_dump(mode="json"), "demonstration_steps": spec.demonstration_steps},
     }

@@ -105,7 +105,7 @@ def _facts(
 
 
 def _beginning(settings: Mapping[str, Any]) -> str:
-    shown = min(settings.get("demonstration_steps", 0), settings["steps"] // 5)
+    shown = settings["demonstration_steps"]
     return f"none; it imitated a rule-based driver, shown in {shown:,} steps" if shown else "none"
 
 

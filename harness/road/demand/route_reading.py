@@ -183,8 +183,11 @@ def _person(path: Path, element: ElementTree.Element, named: NamedRoutes, types:
 
 def _walked(path: Path, where: str, walk: ElementTree.Element, named: NamedRoutes) -> tuple[str, ...]:
     """The edges that a walk names, by itself or by its route."""
+    edges = tuple(walk.get("edges", "").split())
     if walk.get("route") is None:
-        return tuple(walk.get("edges", "").split())
+        return edges
+    if edges:
+        raise UsageError.of(path, where, "has edges and a route", "leave one of them out")
     choices = _named(path, where, walk, named)
     if len(choices) > 1:
         raise UsageError.of(path, where, f"{walk.get('route')!r} is a routeDistribution", "name one route")

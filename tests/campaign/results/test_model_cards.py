@@ -53,7 +53,13 @@ POLICY: dict[str, Any] = {
     "scene": "merge",
     "against": None,
     "began_from": None,
-    "training": {"steps": 3_000_000, "early_convergence": True, "learning_rate": 1e-4, "network": [64, 64]},
+    "training": {
+        "steps": 3_000_000,
+        "early_convergence": True,
+        "learning_rate": 1e-4,
+        "network": [64, 64],
+        "demonstration_steps": 0,
+    },
 }
 NON_EGO_POLICY = {
     **POLICY,
@@ -92,7 +98,7 @@ def case(stage: str, rows: str, person: dict[str, Any] | None = None, **policy: 
 
 
 def shown(steps: int) -> dict[str, Any]:
-    return {**POLICY["training"], "steps": steps, "demonstration_steps": 38_400}
+    return {**POLICY["training"], "demonstration_steps": steps}
 
 
 LIMITS = {
@@ -149,8 +155,8 @@ OF_SPEEDY = """
     [
         case("naive-seed1", OF_NAIVE),
         case("naive-seed1", "trained alone on the road, and beside SUMO's own driver.", against="sumo"),
-        case("naive-seed1", "it imitated a rule-based driver, shown in 38,400 steps |", training=shown(1_000_000)),
-        case("naive-seed1", "it imitated a rule-based driver, shown in 200 steps |", training=shown(1_000)),
+        case("naive-seed1", "it imitated a rule-based driver, shown in 38,400 steps |", training=shown(38_400)),
+        case("naive-seed1", "| initial policy | none |", training=shown(0)),
         case("retrained_distracted-seed1", OF_RETRAINED, against="distracted-seed1", began_from="naive-seed1"),
         case("distracted-seed1", OF_NON_EGO),
         case("distracted-seed1", OF_SPEEDY, persona("speedy")),
