@@ -11,7 +11,7 @@ RUN apt-get update \
 
 COPY . /source
 RUN pip install --no-cache-dir --extra-index-url https://download.pytorch.org/whl/cpu \
-        --constraint /source/requirements.lock /source \
+        --constraint /source/requirements.lock '/source[training]' \
     && mkdir --mode=1777 /cache
 
 # Compiled loops and merged nets: any user of the container may write them.

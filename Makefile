@@ -40,7 +40,7 @@ test-fast: install ## run the tests of every room that take a moment, in about a
 wheel: install ## test the wheel in an environment of its own, with the locked versions: make wheel PYTHON=python3.13
 	rm -rf build/wheel && $(PYTHON) -m venv build/wheel/venv
 	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation -w build/wheel .
-	build/wheel/venv/bin/python -m pip install --quiet --disable-pip-version-check -c requirements.lock build/wheel/*.whl pytest
+	build/wheel/venv/bin/python -m pip install --quiet --disable-pip-version-check -c requirements.lock "$$(ls build/wheel/*.whl)[training]" pytest
 	HARNESS_WHEEL_ENVIRONMENT=build/wheel/venv $(BIN)/pytest -n 0 tests/test_wheel.py $(ARGS)
 
 coverage: install ## run every test and print the share of each module's lines that they run

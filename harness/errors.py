@@ -82,6 +82,16 @@ class UsageError(HarnessError):
         return cls([Problem(str(file), key, message, remedy)])
 
 
+LEARNERS = ("torch", "stable_baselines3", "tensorboard")
+"""Packages of the extra `training`."""
+
+
+def without_learners(needed_by: str) -> UsageError:
+    """The error for what can't be done without the extra `training`."""
+    message = "needs PyTorch and Stable-Baselines3, which are not installed"
+    return UsageError.of(needed_by, "", message, "pip install 'safedriverl-harness[training]'")
+
+
 class PlanError(HarnessError):
     """A plan that can't be carried out: a stage needs one that is not planned, or needs run in a circle."""
 

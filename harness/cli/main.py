@@ -32,6 +32,7 @@ from harness.cli.runs import compare, export, replay, serve
 from harness.cli.scenes import scene_app
 from harness.errors import (
     FAILED,
+    LEARNERS,
     NOT_ACCEPTED,
     USAGE_ERROR,
     HarnessError,
@@ -40,6 +41,7 @@ from harness.errors import (
     is_of_memory,
     of_system,
     short_of_memory,
+    without_learners,
 )
 from harness.shipped_documents import document_at
 
@@ -273,6 +275,8 @@ def main() -> None:
     except HarnessError as error:
         _fail(f"{type(error).__name__}: {error}", FAILED)
     except Exception as error:
+        if isinstance(error, ModuleNotFoundError) and error.name in LEARNERS:
+            _fail(str(without_learners(f"harness {' '.join(sys.argv[1:])}")), USAGE_ERROR)
         if is_of_memory(error):
             _fail(f"{short_of_memory(error)}; finished work is kept", FAILED)
         if not isinstance(error, OSError) or error.errno not in MACHINE_ERRORS:

@@ -22,7 +22,7 @@ from harness.campaign.preflight import open_campaign
 from harness.cli import messages
 from harness.drivers.policy_file import Policy, write_policy
 from harness.environments.gymnasium_env import ParallelDrivingEnv
-from harness.errors import UsageError
+from harness.errors import LEARNERS, UsageError
 from harness.evaluation.tables import read_csv
 from harness.game.observation_layout import SIZE
 from tests.support.policies import some_policy
@@ -35,11 +35,13 @@ from tests.support.tiny import (
     harness,
     learned_run,
     tables,
+    without,
     write_campaign,
     write_persona,
 )
 
 NAMES = ("naive", "speedy", "retrained_speedy")
+MISSING = "needs PyTorch and Stable-Baselines3, which are not installed (pip install 'safedriverl-harness[training]')"
 
 
 def write_played(folder: Path, **changes: Any) -> Path:
@@ -318,3 +320,28 @@ def test_played__manifest_and_report_say_where_the_players_are_from_and_that_not
         ("Training budget", True),
     ):
         assert (words in full, words in page) == (trained, not trained), words
+
+
+# --- without the extra `training` -------------------------------------------------------------------------------------
+
+
+def test_without_learners__what_trains_nothing_runs_to_its_report(tmp_path: Path, policies: Path) -> None:
+    campaign, run = write_played(tmp_path, assessment={"episodes": 2}), tmp_path / "run"
+    played = harness("campaign", campaign, "--out", run, env=without(tmp_path, *LEARNERS))
+    assert played.returncode == 0, played.stdout + played.stderr
+    assert (run / "report.html").is_file()
+    manifest = json.loads((run / "manifest.json").read_text(encoding="utf-8"))
+    assert {entry["status"] for entry in manifest["stages"].values()} == {"done"}
+
+
+def test_without_learners__a_training_is_refused_before_anything_runs(tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    refused = harness("campaign", write_campaign(tmp_path), "--out", run, env=without(tmp_path, *LEARNERS))
+    assert (refused.returncode, refused.stderr) == (2, f"training naive-seed1: {MISSING}\n")
+    assert not list(run.glob(".stages/*/*.parquet"))
+
+
+def test_without_learners__a_command_that_needs_them_says_so(tmp_path: Path, policies: Path) -> None:
+    network = ["policy", "export", policies / "naive-seed1", tmp_path / "naive.pt"]
+    refused = harness(*network, env=without(tmp_path, *LEARNERS))
+    assert (refused.returncode, refused.stderr) == (2, f"harness {' '.join(map(str, network))}: {MISSING}\n")

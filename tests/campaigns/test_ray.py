@@ -31,6 +31,7 @@ from tests.support.tiny import (
     numbers,
     sumo_run,
     wait_for,
+    without,
     write_campaign,
 )
 
@@ -146,17 +147,8 @@ def test_ray__a_bad_address_is_refused_at_once(address: str, message: str, tmp_p
 
 
 def test_ray__that_is_not_installed_is_named_with_the_remedy(tmp_path: Path) -> None:
-    (tmp_path / "sitecustomize.py").write_text(
-        "import sys\n"
-        "class Blocks:\n"
-        "    def find_spec(self, name, path=None, target=None):\n"
-        "        if name == 'ray':\n"
-        "            raise ModuleNotFoundError(name)\n"
-        "sys.meta_path.insert(0, Blocks())\n"
-    )
-    path = os.pathsep.join([str(tmp_path), *sys.path])
     campaign = write_campaign(tmp_path, **BY_SUMO)
-    refused = harness("campaign", campaign, "--ray", "local", env={**os.environ, "PYTHONPATH": path})
+    refused = harness("campaign", campaign, "--ray", "local", env=without(tmp_path, "ray"))
     assert refused.returncode == 2
     assert (
         refused.stderr == "--ray: local: needs Ray, which is not installed (pip install 'safedriverl-harness[ray]')\n"

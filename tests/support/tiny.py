@@ -108,6 +108,13 @@ def harness(*arguments: object, timeout_s: float = PATIENCE_S, **options: Any) -
     return subprocess.run(command, capture_output=True, text=True, timeout=timeout_s, check=False, **options)
 
 
+def without(folder: Path, *packages: str) -> dict[str, str]:
+    """An environment for the command and its workers in which packages are not installed."""
+    blocked = f"import sys\nsys.modules.update(dict.fromkeys({packages!r}))\n"
+    (folder / "sitecustomize.py").write_text(blocked, encoding="utf-8")
+    return {**os.environ, "PYTHONPATH": os.pathsep.join([str(folder), *sys.path])}
+
+
 def begin(*arguments: object) -> subprocess.Popen[str]:
     """Start the command as the leader of a process group, as a shell does, whatever is ignored where the tests run."""
     command = [str(HARNESS), *map(str, arguments)]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from importlib.util import find_spec
 from typing import Any
 
 from rich.console import Console
@@ -15,7 +16,7 @@ from harness.campaign.execution.repeat_check import varying_drivers
 from harness.campaign.execution.run_stages import StartWorkers, run_stages
 from harness.campaign.execution.stage_run import Event, run_context_of
 from harness.campaign.plan.plan import plan
-from harness.campaign.plan.stages import Stage
+from harness.campaign.plan.stages import Stage, TrainingStage
 from harness.campaign.preflight import OpenCampaign
 from harness.campaign.results.kept_results import RunResult, kept_result
 from harness.campaign.storage.learned import Entries, did_not_learn, judged, recorded_goals
@@ -23,7 +24,7 @@ from harness.campaign.storage.manifest import FINISHED, FORMAT
 from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.run_log import LOGGER
 from harness.campaign.storage.versions import versions, versions_of_numbers
-from harness.errors import plain
+from harness.errors import LEARNERS, plain, without_learners
 from harness.evaluation.competence import DID_NOT_LEARN
 from harness.reports.provenance import mixed_versions, warn
 
@@ -67,6 +68,7 @@ def run_campaign(
             console.print(NOTHING_TO_DO, highlight=False)
             LOGGER.info(NOTHING_TO_DO)
             return kept
+        _check_learners(stages, finished)
         folder.results.unlink(missing_ok=True)  # they are those of another manifest
         if len(finished) < len(stages):
             left = {"what is left": {"kind": "", "status": "done", "versions": [versions_of_numbers()]}}
@@ -89,6 +91,13 @@ def run_campaign(
         from harness.campaign.results.results import write_results  # imports pandas and statistics
 
         return write_results(folder, console)
+
+
+def _check_learners(stages: Sequence[Stage], finished: Collection[str]) -> None:
+    """Raise UsageError if a training is left to do without the libraries for it."""
+    left = [stage.id for stage in stages if isinstance(stage, TrainingStage) and stage.id not in finished]
+    if left and not all(map(find_spec, LEARNERS)):
+        raise without_learners(f"training {left[0]}")
 
 
 def log_event(event: Event) -> None:

@@ -43,7 +43,14 @@ def versions() -> dict[str, str]:
     """The version of every program that a run uses, and the system it runs on."""
     system = " ".join((platform.system(), platform.machine(), *platform.libc_ver())).strip()
     found = {"python": platform.python_version(), "platform": system, "harness": __version__}
-    return found | {name: importlib.metadata.version(name) for name in _PACKAGES}
+    return found | {name: _version(name) for name in _PACKAGES}
+
+
+def _version(package: str) -> str:
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:  # of the extra `training`
+        return "not installed"
 
 
 def versions_of_numbers() -> dict[str, str]:
