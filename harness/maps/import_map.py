@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import re
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 from signal import Signals
@@ -24,6 +25,8 @@ from harness.road.xml.xml_file import xml_bytes
 
 _PATIENCE_S = 900.0
 _LAYER_M = 6.0  # of height between a road and the one that it passes over
+_RING_M = 6.0  # of a roundabout of one lane: 16 to 20 ft (NCHRP Report 672, 2010, 6.4.3)
+_WAY = re.compile(rb"""<way\b(?:[^>"']|"[^"]*"|'[^']*')*?\sid=["']([^"']*)["'](?:[^>"']|"[^"]*"|'[^']*')*>""")
 _NO_ROAD = ("has no road that cars may use and that meets another", "export an area with junctions of roads for cars")
 _CUT = "cut out a part: netconvert -s FILE --keep-edges.in-boundary XMIN,YMIN,XMAX,YMAX -o part.net.xml"
 _OSM_TYPES = ("osmNetconvert", "osmNetconvertUrbanDe")
@@ -108,7 +111,7 @@ def _check_own_net(path: Path, left_hand: bool) -> None:
 def _convert(path: Path, kind: MapKind, *, facts: MapFacts, net_file: Path, left_hand: bool) -> str:
     """Write the net of a map. Returns a line on the options that had to be left out; empty if there are none."""
     source = net_file.with_name("map.xml")  # netconvert splits names at commas and blanks
-    source.write_bytes(xml_bytes(path, MOST_BYTES))
+    source.write_bytes(_with_wide_rings(xml_bytes(path, MOST_BYTES), facts.narrow_rings))
     options = ["--xml-validation", "never", "--output-file", net_file.name, "--aggregate-warnings", "1", *_LIGHTS]
     if kind is MapKind.OSM:
         types = Path(sumo.SUMO_HOME) / "data" / "typemap"
@@ -139,6 +142,13 @@ def _convert(path: Path, kind: MapKind, *, facts: MapFacts, net_file: Path, left
         message = f"netconvert can't convert it: {errors[0].replace(source.name, path.name)}"
         raise UsageError.of(path, "", message, "repair the map, or export it again")
     return f"{crash}; converted without {', '.join(left_out)}" if left_out else ""
+
+
+def _with_wide_rings(content: bytes, ways: Collection[str]) -> bytes:
+    """An OpenStreetMap file with a tag `width` for these ways. On a lane of SUMO's width, a car that turns into the
+    ring touches its island."""
+    names, width = {each.encode() for each in ways}, b'<tag k="width" v="%g"/>' % _RING_M
+    return _WAY.sub(lambda way: way[0] + width * (way[1] in names), content) if ways else content
 
 
 def _is_left(path: Path, facts: MapFacts, left_hand: bool) -> bool:

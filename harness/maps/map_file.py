@@ -26,6 +26,7 @@ _FOR_CARS = {
     *("motorway", "trunk", "primary", "secondary", "tertiary", "unclassified", "residential", "living_street"),
     *("motorway_link", "trunk_link", "primary_link", "secondary_link", "tertiary_link", "service", "road"),
 }
+_OF_TWO_LANES = ("motorway", "trunk", "primary")  # in SUMO's type maps, where a one-way road has no tag lanes
 _CUBIC = ("a", "b", "c", "d")
 _NUMBERS: dict[str, tuple[str, ...]] = {  # attributes of OpenDRIVE from which netconvert makes a net, whatever they are
     "road": ("length",),
@@ -59,6 +60,7 @@ class MapFacts:
     highest_deg: tuple[float, float] = (-inf, -inf)
     says_left: bool = False  # it has a tag driving_side=left
     has_layers: bool = False  # some roads of an OpenStreetMap file pass over or under others
+    narrow_rings: set[str] = field(default_factory=set)  # ways of roundabouts with one lane and without a width
     rules: set[str] = field(default_factory=set)  # RHT and LHT, of the roads of an OpenDRIVE file
     broken: tuple[str, str] | None = None  # the first road of an OpenDRIVE file that is not sound, and why
     uneven: str = ""  # the first road with left-hand traffic whose two directions have different lanes
@@ -129,10 +131,13 @@ def _note_osm(element: Element, facts: MapFacts) -> None:
     if element.tag in ("way", "relation"):
         facts.says_left |= any(tag.attrib == {"k": "driving_side", "v": "left"} for tag in element.iter("tag"))
     if element.tag == "way":
-        tags = {each.get("k"): each.get("v", "") for each in element.iter("tag")}
+        tags = {each.get("k", ""): each.get("v", "") for each in element.iter("tag")}
         is_road = tags.get("highway") in _FOR_CARS
         facts.roads += is_road
         facts.has_layers |= is_road and tags.get("layer", "").lstrip("+-").strip("0") != ""
+        lanes = tags.get("lanes", "2" if tags.get("highway") in _OF_TWO_LANES else "1")
+        if is_road and (tags.get("junction"), lanes) == ("roundabout", "1") and not any("width" in key for key in tags):
+            facts.narrow_rings.add(element.get("id", ""))
     if element.tag in ("node", "way", "relation"):
         element.clear()
 

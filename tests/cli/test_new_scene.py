@@ -20,6 +20,7 @@ from harness.cli.scene_writing import write_scenes
 from harness.errors import UsageError
 from harness.game.initial_state import draw_initial_state
 from harness.maps.candidates import CandidateKind
+from harness.maps.game_plans import GamePlan
 from harness.maps.open_map import OpenMap, open_map
 from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.esmini import require_esmini
@@ -145,12 +146,24 @@ def test_write__of_several_plans_the_first_that_is_in_order(town: OpenMap, tmp_p
     assert {problem.file for problem in problems} == {"conflict 7"}
 
 
-# the corner from an arm into this drawn ring has a radius of 4 m, within lanes of 3.5 m
-def test_write__a_route_that_can_not_be_driven_makes_no_scene(town: OpenMap, tmp_path: Path) -> None:
-    ring = next(plan for plan in town.plans if plan.candidate.kind is CandidateKind.ROUNDABOUT)
+def ring_of(opened: OpenMap) -> GamePlan:
+    """The first conflict at a roundabout."""
+    return next(plan for plan in opened.plans if plan.candidate.kind is CandidateKind.ROUNDABOUT)
+
+
+def test_write__a_roundabout_of_openstreetmap_can_be_driven(town: OpenMap, tmp_path: Path) -> None:
+    assert write_scenes(town, {"ring": [ring_of(town)]}, tmp_path) == ({"ring": ring_of(town)}, [])
+
+
+# the corner from an arm into the drawn ring has a radius of 4 m: a car needs more than a lane of the usual width there
+def test_write__a_route_that_can_not_be_driven_makes_no_scene(tmp_path: Path) -> None:
+    narrow = tmp_path / "narrow.osm"
+    ring = '<tag k="junction" v="roundabout"/>'
+    narrow.write_text(TOWN.read_text(encoding="utf-8").replace(ring, f'{ring}<tag k="width" v="3.2"/>'))
+    opened = open_map(narrow, tmp_path, left_hand=False)
     with pytest.raises(UsageError, match="ego: alone, a rule-based driver reaches the goal from 0 of 50 starts"):
-        write_scenes(town, {"ring": [ring]}, tmp_path)
-    assert files_in(tmp_path) == []
+        write_scenes(opened, {"ring": [ring_of(opened)]}, tmp_path)
+    assert not (tmp_path / "networks").exists()
 
 
 @pytest.mark.skipif(not REAL_TOWN.is_file(), reason="SUMO's wheel does not ship this net")

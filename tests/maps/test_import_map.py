@@ -39,6 +39,30 @@ def test_import__of_openstreetmap_keeps_names_widths_and_limits(town: Net) -> No
     assert any(edge.getFunction() == "crossing" for edge in town.getEdges())
 
 
+RING = '<tag k="junction" v="roundabout"/>'
+
+
+def ring_widths_m(folder: Path, before: str = RING, after: str = RING) -> set[float]:
+    """The widths of the ring's lanes of the town, after a change of its text."""
+    file = written(folder, "ring.osm", TOWN.read_text(encoding="utf-8").replace(before, after))
+    net = import_map(file, folder, left_hand=False).net
+    names = [name for each in net.getRoundabouts() for name in each.getEdges()]
+    return {lane.getWidth() for name in names for lane in net.getEdge(name).getLanes()}
+
+
+def test_import__a_roundabout_of_one_lane_gets_the_width_of_a_real_one(tmp_path: Path) -> None:
+    assert ring_widths_m(tmp_path) == {6.0}
+    assert ring_widths_m(tmp_path, '<way id="104" version="1">', "<way user='>' id='104'>") == {6.0}
+
+
+@pytest.mark.parametrize(("tags", "width_m"), [('<tag k="width" v="4.5"/>', 4.5), ('<tag k="lanes" v="2"/>', 3.2)])
+def test_import__a_roundabout_with_a_width_or_two_lanes_stays_as_it_is(
+    tmp_path: Path, tags: str, width_m: float
+) -> None:
+    lanes = '<tag k="name" v="Am Kreisel"/><tag k="maxspeed" v="30"/><tag k="lanes" v="1"/>'
+    assert ring_widths_m(tmp_path, RING + lanes, RING + tags) == {width_m}
+
+
 def test_import__of_openstreetmap_keeps_the_projection(tmp_path: Path) -> None:
     file = import_map(TOWN, tmp_path, left_hand=False).net_file
     assert 'projParameter="+proj=utm +zone=32' in file.read_text(encoding="utf-8")

@@ -49,6 +49,26 @@ def test_facts__count_the_roads_for_cars_and_see_layers(tmp_path: Path) -> None:
     assert facts_of(file, MapKind.OSM).has_layers
 
 
+@pytest.mark.parametrize(
+    ("tags", "is_narrow"),
+    [
+        ({"highway": "residential"}, True),
+        ({"highway": "primary"}, False),  # two lanes, as netconvert has it
+        ({"highway": "primary", "lanes": "1"}, True),
+        ({"highway": "tertiary", "lanes": "2"}, False),
+        ({"highway": "tertiary", "width": "5"}, False),
+        ({"highway": "tertiary", "width:lanes": "5"}, False),
+        ({"highway": "footway"}, False),
+    ],
+)
+def test_facts__name_the_roundabouts_of_one_lane_without_a_width(
+    tmp_path: Path, tags: dict[str, str], is_narrow: bool
+) -> None:
+    ring = "".join(f'<tag k="{key}" v="{value}"/>' for key, value in {"junction": "roundabout", **tags}.items())
+    (tmp_path / "a.osm").write_text(osm(ROAD.format("") + f'<way id="2">{ring}</way>'))
+    assert facts_of(tmp_path / "a.osm", MapKind.OSM).narrow_rings == ({"2"} if is_narrow else set())
+
+
 def test_facts__are_those_of_the_file_when_it_is_compressed(tmp_path: Path) -> None:
     packed, content = tmp_path / "town.osm.gz", (MAPS / "town.osm").read_bytes()
     packed.write_bytes(gzip.compress(content[:999]) + gzip.compress(content[999:]))  # of two members
