@@ -176,7 +176,7 @@ def test_ray__deaths_of_workers_follow_the_rule_of_the_harness(cluster: Any, tmp
     folder.claim("deaths")
     with ray_cluster(cluster.address, None) as ray, folder.held():
         context = empty_context(folder.path)
-        workers = RayWorkers(context, len(stages), ray=ray, jobs=2, warn=pytest.fail, work=die_in_segments)
+        workers = RayWorkers(context, ray=ray, jobs=2, warn=pytest.fail, work=die_in_segments)
         run_stages(stages, [], workers, events.append)
     told = [f"{event.kind} {event.stage.removesuffix('-seed1')}" for event in events]
     assert told.count("crashed a") == told.count("crashed b") == MOST_CRASHES - 1

@@ -3,25 +3,29 @@
 <work>/segments/<first>-<last>.json            checksums: the segment is complete; and the versions that played it
 <work>/segments/<first>-<last>.<table>         its log: outcomes and errors, and traces
 
-So an arm continues where it stopped, and needs the memory of one segment, however many games it has. A game depends on
-nothing but itself: the files of an arm are the same bytes with and without interruptions.
+So an arm continues where it stopped, needs the memory of one segment, however many games it has, and workers that have
+nothing else to do help its own: who plays a segment has its lock. A game depends on nothing but itself: the files of an
+arm are the same bytes with and without interruptions, and whoever plays its games.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing, suppress
 from dataclasses import dataclass
-from itertools import chain
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
 from harness.assessment.rollout import Game, SeatedArm, assess
 from harness.campaign.execution.player_factory import PlayerFactory
-from harness.campaign.execution.stage_run import StageRun
-from harness.campaign.plan.stages import AssessmentStage
+from harness.campaign.execution.stage_run import SEGMENT_EPISODES, StageRun
+from harness.campaign.plan.stages import AssessmentStage, stage_id
 from harness.campaign.storage.arm_tables import PLAYED, arm_tables
 from harness.campaign.storage.checksums import intact_record, write_checksums
+from harness.campaign.storage.locks import InUse, held_by_worker
 from harness.campaign.storage.versions import versions_of_numbers
 from harness.errors import StageFailed
 from harness.evaluation.competence import goals_alone
@@ -31,11 +35,12 @@ from harness.evaluation.unplayed_games import reason_of
 from harness.files import make_folder
 from harness.road.scene.open_scene import OpenScene
 
-SEGMENT_EPISODES = 50
 HOPELESS_GAMES = 10
 """An arm ends if this many games, its first, can't be played for one reason: the others would not be played either."""
 KEEP_GOING = "--keep-going"
 _TRACES = "traces.parquet"
+_HELP_S = 10.0  # the time after which a helper starts no further segment: a stage may wait for it
+_POLL_S = 0.25
 
 
 @dataclass(frozen=True)
@@ -48,6 +53,11 @@ class Segment:
     def file(self, name: str) -> Path:
         return self.folder / f"{self.episodes[0]:06d}-{self.episodes[-1]:06d}.{name}"
 
+    @property
+    def is_played(self) -> bool:
+        """Whether it is complete, by this run of the command: what is not intact was removed when its arm began."""
+        return self.file("json").is_file()
+
     def errors(self) -> int | None:
         """How many of its games could not be played; None if it is not complete, or was played by other versions."""
         record = intact_record(self.file("json"), self.folder, versions=versions_of_numbers()) or {}
@@ -55,9 +65,9 @@ class Segment:
         return errors if isinstance(errors, int) else None
 
     def play(
-        self, games: Iterator[Game], labels: Mapping[str, Any], arm: SeatedArm, on_game: Callable[[Game], None]
-    ) -> int:
-        """Play it; `games` yields its games next. Returns how many of them could not be played."""
+        self, games: Iterator[Game], labels: Mapping[str, Any], arm: SeatedArm, on_game: Callable[[int], None]
+    ) -> None:
+        """Play it; `games` yields its games next. `on_game` gets the number of those that are played."""
         records = []
         with trace_writer(self.file(_TRACES)) as add_trace:
             for _ in self.episodes:
@@ -65,13 +75,12 @@ class Segment:
                 records.append({**game.played, **labels})
                 if game.trace is not None:
                     add_trace(game.trace)
-                on_game(game)
+                on_game(len(records))
         table = table_of("played", records, len(arm.drivers) - 1)
         write_csv(table, self.file(PLAYED))
         files = [self.file(name) for name in (PLAYED, _TRACES)]
         errors = int((table["error"] != "").sum())
         write_checksums(self.file("json"), self.folder, files, {"errors": errors, "versions": versions_of_numbers()})
-        return errors
 
 
 def carry_out_assessment(stage: AssessmentStage, run: StageRun, scene: OpenScene) -> tuple[dict[str, Any], list[Path]]:
@@ -79,16 +88,36 @@ def carry_out_assessment(stage: AssessmentStage, run: StageRun, scene: OpenScene
     folder, players = run.context.folder, PlayerFactory(context=run.context, scene=scene)
     stage, choice = players.chosen(stage)
     segments = segments_of(folder.segments(stage.id), run.context.document.assessment.episodes)
-    labels: dict[str, str | int] = {"arm": stage.name, "persona": stage.persona, "seed": stage.seed}
-    errors = play_segments(players.arm(stage), segments, labels, run)
+    labels = _labels(stage)
+    play_segments(players.arm(stage), segments, labels, run)
     played, traces = folder.work(stage.id) / PLAYED, folder.traces(stage.id)
     join_segments(segments, played, traces, labels)
     games = arm_tables(folder, stage.id, scene).episodes
-    facts: dict[str, Any] = {"episodes": len(games), "errors": errors}
+    facts: dict[str, Any] = {"episodes": len(games), "errors": int((games["error"] != "").sum())}
     facts |= {"versions": [versions_of_numbers()], **choice}
     if not all(stage.sides):  # whether the training of the player that drives alone succeeded
         facts |= goals_alone(games, "ego" if stage.ego else "non_ego").record()
     return facts, [played, traces]
+
+
+def help_with_arm(stage: AssessmentStage, run: StageRun, scene: OpenScene) -> dict[str, int]:
+    """Play segments of an arm that its own worker has begun, the last ones first. Returns how many were played.
+
+    Raises as `carry_out_assessment` does.
+    """
+    folder = run.context.folder
+    segments = segments_of(folder.segments(stage.id), run.context.document.assessment.episodes)
+    left = [each for each in reversed(segments) if not each.is_played]
+    if not left or folder.done(stage.id):
+        return {"segments": 0}
+    arm, until_s = PlayerFactory(context=run.context, scene=scene).arm(stage), time.monotonic() + _HELP_S
+    in_time = takewhile(lambda _: time.monotonic() < until_s, left)
+    return {"segments": _play_free(arm, in_time, _labels(stage), run)}
+
+
+def _labels(stage: AssessmentStage) -> dict[str, str | int]:
+    """The cells that all records of an arm share."""
+    return {"arm": stage.name, "persona": stage.persona, "seed": stage.seed}
 
 
 def segments_of(folder: Path, episodes: int) -> list[Segment]:
@@ -96,37 +125,71 @@ def segments_of(folder: Path, episodes: int) -> list[Segment]:
     return [Segment(folder, range(first, min(first + SEGMENT_EPISODES, episodes))) for first in firsts]
 
 
-def play_segments(arm: SeatedArm, segments: Sequence[Segment], labels: Mapping[str, Any], run: StageRun) -> int:
-    """Play the games of an arm that are missing. Returns how many of all its games could not be played.
+def play_segments(arm: SeatedArm, segments: Sequence[Segment], labels: Mapping[str, Any], run: StageRun) -> None:
+    """Play the games of an arm that are missing, and wait for those that helpers play.
 
-    `labels` are the cells that all records share. The run is told of each episode before that game is played, and of
-    the games played and their total. Raises as `assess` does, and StageFailed if the first ten games can't be played
-    for one reason, unless the run keeps going.
+    `labels` are the cells that all records share. The run is told of each episode before that game is played here, and
+    of the games played, by whomever, and their total. Raises as `assess` does, and StageFailed if the first ten games
+    can't be played for one reason, unless the run keeps going.
     """
     make_folder(segments[0].folder)
-    errors = {segment: segment.errors() for segment in segments}
-    missing = [each for each, found in errors.items() if found is None or (found and run.attempt.first)]
-    total = segments[-1].episodes.stop
-    done = total - sum(len(segment.episodes) for segment in missing)
-    first: list[str] | None = None if run.context.keep_going or done else []
-
-    def on_game(game: Game) -> None:
-        nonlocal done
-        done += 1
-        run.on_progress(done, total)
-        if first is None or done > HOPELESS_GAMES:
-            return
-        first.append(str(game.played["error"]))
-        if done == HOPELESS_GAMES and all(first) and len(set(map(reason_of, first))) == 1:
-            what = f"{arm.name}: none of its first {HOPELESS_GAMES} games could be played, all for one reason"
-            raise StageFailed(f"{what} ({KEEP_GOING} plays the others too): {first[0]}")
-
-    episodes = chain.from_iterable(segment.episodes for segment in missing)
-    with closing(assess(arm, episodes, run.on_start, run.attempt.abandoned)) as games:  # type: ignore[type-var]
-        for segment in missing:
+    for segment in segments:
+        errors = segment.errors()
+        if errors is None or (errors and run.attempt.first):
             segment.file("json").unlink(missing_ok=True)
-            errors[segment] = segment.play(games, labels, arm, on_game)
-    return sum(found or 0 for found in errors.values())
+    left, total = list(segments), segments[-1].episodes.stop
+
+    def report(playing: int = 0) -> None:
+        left[:] = [each for each in left if not each.is_played]
+        run.on_progress(total - sum(len(each.episodes) for each in left) + playing, total)
+
+    def until_played(part: Sequence[Segment]) -> Iterator[Segment]:
+        while missing := [each for each in part if not each.is_played]:
+            yield from missing
+            report()
+            if not all(each.is_played for each in part):  # a helper plays them
+                time.sleep(_POLL_S)
+
+    def in_order() -> Iterator[Segment]:
+        first = [each for each in segments if each.episodes[0] < HOPELESS_GAMES]
+        report()
+        yield from until_played(first)
+        if not run.context.keep_going:
+            _check_hope(arm, first)
+        yield from until_played(segments[len(first) :])
+
+    _play_free(arm, in_order(), labels, run, report)
+
+
+def _check_hope(arm: SeatedArm, first: Sequence[Segment]) -> None:
+    """Raises StageFailed if the first ten games of an arm could not be played, all for one reason."""
+    errors = [str(error) for each in first for error in read_csv(each.file(PLAYED))["error"]][:HOPELESS_GAMES]
+    if len(errors) == HOPELESS_GAMES and all(errors) and len(set(map(reason_of, errors))) == 1:
+        what = f"{arm.name}: none of its first {HOPELESS_GAMES} games could be played, all for one reason"
+        raise StageFailed(f"{what} ({KEEP_GOING} plays the others too): {errors[0]}")
+
+
+def _play_free(
+    arm: SeatedArm,
+    segments: Iterable[Segment],
+    labels: Mapping[str, Any],
+    run: StageRun,
+    on_game: Callable[[int], None] = lambda playing: None,
+) -> int:
+    """Play the segments that no other worker plays or has played. Returns their number.
+
+    `on_game` gets the number of games played in the current one.
+    """
+    stage, played, episodes = stage_id(arm.name, arm.seed), 0, deque[int]()
+    folder, upcoming = run.context.folder, iter(episodes.popleft, None)
+    with closing(assess(arm, upcoming, run.on_start, run.attempt.abandoned)) as games:  # type: ignore[type-var]
+        for segment in segments:
+            with suppress(InUse), held_by_worker(folder.workers, f"{stage}.{segment.episodes[0]:06d}", 0.0):
+                if not segment.is_played and folder.done(stage) is None:
+                    episodes.extend(segment.episodes)
+                    segment.play(games, labels, arm, on_game)
+                    played += 1
+    return played
 
 
 def join_segments(segments: Sequence[Segment], played: Path, traces: Path, labels: Mapping[str, str | int]) -> None:

@@ -27,6 +27,7 @@ from harness.campaign.execution.stage_run import Event
 from harness.campaign.plan.stages import Stage
 
 STARTING = "starting"
+_PACE_S = 600.0  # rates are means over this time: a game of a slow driver takes minutes
 LINE_EVERY_S = 60.0
 """Where there are no bars, each running stage has a line so often."""
 
@@ -59,6 +60,7 @@ class StageProgress:
             disable=not console.is_terminal,
             transient=True,
             get_time=clock,
+            speed_estimate_period=_PACE_S,
         )
         self._whole = self.bars.add_task("campaign", total=len(stages), completed=finished, unit="stages")
         self._rows: dict[str, TaskID] = {}

@@ -1,7 +1,7 @@
 """Workers on the nodes of a Ray cluster, which is started on this machine for one run of the command or connected to.
 
-Each stage is a task of one core, on a node that was checked. Ray repeats no task: what follows from a death is decided
-by `run_stages`, as on one machine. A process of Ray carries several stages out, one after the other, as a worker of
+Each task takes one core, on a node that was checked. Ray repeats no task: what follows from a death is decided
+by `run_stages`, as on one machine. A process of Ray carries several of them out, one after the other, as a worker of
 `worker_pool` does.
 
 Ray is the extra `ray`: it is imported where it is asked for. Ray itself refuses a cluster with another version of Ray
@@ -25,9 +25,8 @@ from typing import Any
 
 from harness.campaign.execution.ray_nodes import OPTION, Node, Nodes, pinned, token_file
 from harness.campaign.execution.run_stage import carry_out
-from harness.campaign.execution.stage_run import Attempt, Event, RunContext, Work, carry_out_in_worker
+from harness.campaign.execution.stage_run import Attempt, Event, RunContext, Task, Work, carry_out_in_worker
 from harness.campaign.execution.worker_pool import cores
-from harness.campaign.plan.stages import Stage
 from harness.campaign.storage.run_folder import RunFolder
 from harness.errors import UsageError
 from harness.files import make_folder, write_atomically
@@ -132,14 +131,14 @@ class Inbox:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Task:
+class _Submitted:
     number: int
-    stage: Stage
+    task: Task
     node: Node
 
 
 class RayWorkers:
-    """The nodes of a cluster, for at most `jobs` stages at a time; see `run_stages.Workers`.
+    """The nodes of a cluster, for at most `jobs` tasks at a time; see `run_stages.Workers`.
 
     `ray` is connected to the cluster. Entering it checks all nodes, and raises UsageError with what is wrong with them.
     """
@@ -147,7 +146,6 @@ class RayWorkers:
     def __init__(
         self,
         context: RunContext,
-        stages_left: int,
         *,
         ray: Any,
         jobs: int | None,
@@ -156,39 +154,40 @@ class RayWorkers:
     ) -> None:
         policies = context.policies.absolute() if context.policies is not None else None
         self._context = replace(context, folder=RunFolder(context.folder.path.absolute()), policies=policies)
-        self._ray, self._jobs, self._warn, self._work = ray, min(jobs or stages_left, stages_left), warn, work
+        self._ray, self._jobs, self._warn, self._work = ray, jobs, warn, work
         self._nodes = Nodes(ray=ray, context=self._context, token=f"{os.getpid()} {time.time_ns()}")
         self._remote = ray.remote(num_cpus=1, max_retries=0)(_carry_out)
-        self._tasks: dict[Any, _Task] = {}
+        self._submitted: dict[Any, _Submitted] = {}
         self._started = 0
         self._looked_s = 0.0
 
     @property
     def capacity(self) -> int:
         """Cores of the nodes that can be used now, at most `jobs`. At least 1: `submit` waits for a node in doubt."""
-        return max(min(self._jobs, sum(node.cpus for node in self._nodes.usable.values())), 1)
+        cpus = sum(node.cpus for node in self._nodes.usable.values())
+        return max(min(self._jobs or cpus, cpus), 1)
 
-    def submit(self, stage: Stage, attempt: Attempt) -> None:
-        """Start a stage on the node with most free cores. Raises UsageError if no node is left."""
+    def submit(self, task: Task, attempt: Attempt) -> None:
+        """Start a task on the node with most free cores. Raises UsageError if no node is left."""
         while not self._nodes.usable and self._nodes.waiting:
             self._settle(_POLL_S)
         if not self._nodes.usable:
             remedy = "start nodes and run the same command again: finished work is kept"
             raise UsageError.of(OPTION, "", "the cluster has no node with a core", remedy)
         node = max(self._nodes.usable.values(), key=lambda each: each.cpus - each.running)
-        task = _Task(number=self._started, stage=stage, node=node)
+        submitted = _Submitted(number=self._started, task=task, node=node)
         remote = self._remote.options(scheduling_strategy=pinned(node.id))
         ref = remote.remote(
-            stage, attempt, context=self._context, work=self._work, number=task.number, inbox=self._inbox
+            task, attempt, context=self._context, work=self._work, number=submitted.number, inbox=self._inbox
         )
-        self._tasks[ref] = task
+        self._submitted[ref] = submitted
         self._started += 1
         node.running += 1
 
     def next_events(self) -> Sequence[Event]:
         """Wait a moment for the end of a task: what has happened since the last time."""
-        ended, _ = self._ray.wait(list(self._tasks), num_returns=1, timeout=_POLL_S)
-        running = {task.number for task in self._tasks.values()}
+        ended, _ = self._ray.wait(list(self._submitted), num_returns=1, timeout=_POLL_S)
+        running = {each.number for each in self._submitted.values()}
         # what a task sent before it ended is there: of its messages those that matter were acknowledged
         events = [event for number, event in self._ray.get(self._inbox.take.remote()) if number in running]
         events += [self._end_of(ref) for ref in ended]
@@ -214,7 +213,7 @@ class RayWorkers:
     def __exit__(self, *exception: object) -> None:
         """Tasks that still run end when the command leaves the cluster: Ray ends its workers. `ray.cancel` is not
         called: Ray aborts the whole process where a task ends at the same moment."""
-        self._tasks.clear()
+        self._submitted.clear()
         self._ray.kill(self._inbox)
 
     def _settle(self, timeout_s: float) -> None:
@@ -222,16 +221,16 @@ class RayWorkers:
             self._warn(f"{problem}; it is not used")
 
     def _end_of(self, ref: Any) -> Event:
-        task, errors = self._tasks.pop(ref), self._ray.exceptions
-        task.node.running -= 1
+        submitted, errors = self._submitted.pop(ref), self._ray.exceptions
+        submitted.node.running -= 1
         try:
             event: Event = self._ray.get(ref)
             return event
         except errors.RayTaskError as error:
-            return Event(kind="failed", stage=task.stage.id, message=str(error))
+            return Event(kind="failed", stage=submitted.task.id, message=str(error))
         except errors.RayError as error:
-            self._nodes.suspect(task.node)
-            return Event(kind="crashed", stage=task.stage.id, message=_cause(errors, error, task.node))
+            self._nodes.suspect(submitted.node)
+            return Event(kind="crashed", stage=submitted.task.id, message=_cause(errors, error, submitted.node))
 
 
 def _cause(errors: Any, error: Exception, node: Node) -> str:
@@ -242,7 +241,7 @@ def _cause(errors: Any, error: Exception, node: Node) -> str:
     return f"node {node.name} is lost ({type(error).__name__})"
 
 
-def _carry_out(stage: Stage, attempt: Attempt, *, context: RunContext, work: Work, number: int, inbox: Any) -> Event:
+def _carry_out(task: Task, attempt: Attempt, *, context: RunContext, work: Work, number: int, inbox: Any) -> Event:
     import ray
 
     def send(event: Event) -> None:
@@ -250,4 +249,4 @@ def _carry_out(stage: Stage, attempt: Attempt, *, context: RunContext, work: Wor
         if event.kind == "segment":
             ray.get(message)  # if the process dies now, the place is known
 
-    return carry_out_in_worker(stage, attempt, context=context, work=work, send=send)
+    return carry_out_in_worker(task, attempt, context=context, work=work, send=send)

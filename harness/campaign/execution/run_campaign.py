@@ -86,8 +86,7 @@ def run_campaign(
                             LOGGER.warning("%s: %s: %s", DID_NOT_LEARN, training, shortfall)
 
                 context = run_context_of(campaign, folder, keys, keep_going)
-                workers = start_workers(context, len(stages) - len(finished))
-                run_stages(stages, finished, workers, emit)
+                run_stages(stages, finished, start_workers(context), emit)
         from harness.campaign.results.results import write_results  # imports pandas and statistics
 
         return write_results(folder, console)
@@ -149,16 +148,16 @@ class _ManifestKeeper:
 
     def note(self, event: Event) -> None:
         """Write down what happened to a stage."""
-        entry = self._entries[event.stage]
         match event.kind:
             case "done":
-                entry.update({"message": "", **event.info}, status=_status(event.info))
+                changes = {"message": "", **event.info, "status": _status(event.info)}
             case "failed":
-                entry.update(status="failed", message=event.message)
+                changes = {"status": "failed", "message": event.message}
             case "skipped":
-                entry.update(status="pending", message=event.message)
+                changes = {"status": "pending", "message": event.message}
             case _:
                 return
+        self._entries[event.stage].update(changes)
         self._write()
 
     def _write(self) -> None:

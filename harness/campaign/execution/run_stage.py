@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from harness.campaign.execution.stage_run import StageRun
+from harness.campaign.execution.stage_run import Help, StageRun, Task
 from harness.campaign.plan.stages import (
     AssessmentStage,
     EquilibriumGate,
@@ -27,7 +27,16 @@ from harness.campaign.storage.run_folder import RunFolder
 from harness.road.scene.open_scene import OpenScene, open_scene
 
 
-def carry_out(stage: Stage, run: StageRun) -> dict[str, Any]:
+def carry_out(task: Task, run: StageRun) -> dict[str, Any]:
+    """Carry out a stage, or help with one. Returns the facts for the manifest, or of the help."""
+    if not isinstance(task, Help):
+        return _carry_out_stage(task, run)
+    from harness.campaign.execution.assessment_stage import help_with_arm
+
+    return help_with_arm(task.arm, run, open_scene(run.context.folder.scene, run.context.vehicle_type(task.arm)))
+
+
+def _carry_out_stage(stage: Stage, run: StageRun) -> dict[str, Any]:
     """Carry out a stage and write the checksums of what it made. Returns the facts for the manifest.
 
     What the stage wrote from other inputs is removed first.

@@ -6,17 +6,23 @@ cluster (`ray_workers`).
 A worker that crashes affects no other: its stage continues from its last segment in another one. After `MOST_CRASHES`
 crashes in the same segment a training has failed, by name, and the stages that don't need it continue; after as many in
 the same game an arm continues without that game, which is an error.
+
+Where workers are idle and no stage is ready, they help with arms that are running: they play segments of their games,
+for some seconds at a time. A worker that crashes or fails while it helps changes nothing: the arm's own worker plays
+what is missing.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from itertools import count
 from typing import Protocol, TypeAlias
 
 from harness.campaign.execution.schedule import Schedule
-from harness.campaign.execution.stage_run import Attempt, Emit, Event, RunContext
-from harness.campaign.plan.stages import AssessmentStage, PreventabilityStage, Stage
+from harness.campaign.execution.stage_run import SEGMENT_EPISODES, Attempt, Emit, Event, Help, RunContext, Task
+from harness.campaign.plan.stages import AssessmentStage, BestOf, PreventabilityStage, Stage
 
 MOST_CRASHES = 3
 """Crashes of one segment or game after which it is not tried again."""
@@ -25,21 +31,21 @@ MOST_ABANDONED = 20
 
 
 class Workers(Protocol):
-    """What carries stages out. Workers exist inside the `with` block; none is left after it, however it ends."""
+    """What carries tasks out. Workers exist inside the `with` block; none is left after it, however it ends."""
 
     @property
     def capacity(self) -> int:
-        """Number of stages that they can carry out at a time now."""
+        """Number of tasks that they can carry out at a time now."""
         ...
 
-    def submit(self, stage: Stage, attempt: Attempt) -> None:
-        """Start a stage. It is called only while fewer than `capacity` stages are running."""
+    def submit(self, task: Task, attempt: Attempt) -> None:
+        """Start a task. It is called only while fewer than `capacity` tasks are running."""
         ...
 
     def next_events(self) -> Sequence[Event]:
-        """Wait until something happens to a running stage; the events in their order, possibly none.
+        """Wait until something happens to a running task; the events in their order, possibly none.
 
-        A stage ends with done, failed or crashed. After crashed, nothing of that attempt is reported any more.
+        A task ends with done, failed or crashed. After crashed, nothing of that attempt is reported any more.
         """
         ...
 
@@ -47,8 +53,8 @@ class Workers(Protocol):
     def __exit__(self, *exception: object) -> None: ...
 
 
-StartWorkers: TypeAlias = Callable[[RunContext, int], Workers]
-"""Makes the workers of a run, from what its stages share and the number of stages that are left."""
+StartWorkers: TypeAlias = Callable[[RunContext], Workers]
+"""Makes the workers of a run, from what its stages share."""
 
 
 class Crashes:
@@ -69,7 +75,11 @@ class Crashes:
         first = stage.id not in self._attempted
         self._attempted.add(stage.id)
         self._place.pop(stage.id, None)
-        return Attempt(first=first, abandoned=dict(self._abandoned.get(stage.id, {})))
+        return Attempt(first=first, abandoned=self.abandoned(stage))
+
+    def abandoned(self, stage: Stage) -> dict[int, str]:
+        """The games of an arm that are not played again, each with the reason."""
+        return dict(self._abandoned.get(stage.id, {}))
 
     def note_start(self, stage: str, place: int) -> None:
         """A worker starts a segment, game or trial."""
@@ -96,16 +106,63 @@ class Crashes:
         return Event(kind="crashed", stage=stage.id, message=f"{often} in game {place}, which is abandoned")
 
 
+class _Helping:
+    """Finds the running arms that idle workers help with."""
+
+    def __init__(self) -> None:
+        self.running: dict[str, Help] = {}
+        self._left: dict[str, int] = {}
+        """Games of each running arm that were not played when it last reported."""
+        self._closed: set[str] = set()
+        """Arms with no segment left to start, or in which a helper crashed or failed."""
+        self._numbers = count(1)
+
+    def next_help(self, stages: Iterable[Stage]) -> Help | None:
+        """Help with the running arm that has most games left for each of its workers; None if no arm has a segment
+        left that nobody plays. Which of several best responses an arm plays, its own worker finds out."""
+        helped = Counter(each.arm.id for each in self.running.values())
+        arms = [each for each in stages if isinstance(each, AssessmentStage) and each.id not in self._closed]
+        left = {
+            arm: self._left.get(arm.id, 0) / (1 + helped[arm.id])
+            for arm in arms
+            if not any(isinstance(driver, BestOf) for driver in arm.drivers)
+        }
+        arm = max(left, key=left.__getitem__, default=None)
+        if arm is None or left[arm] <= SEGMENT_EPISODES:
+            return None
+        task = Help(arm=arm, number=next(self._numbers))
+        self.running[task.id] = task
+        return task
+
+    def note_progress(self, event: Event) -> None:
+        """A stage reports what it has done of its own work."""
+        self._left[event.stage] = event.total - event.done
+
+    def note(self, event: Event, emit: Emit) -> None:
+        """Something happened to a helper. One that crashed or failed is emitted as crashed: its arm goes on."""
+        if event.kind in ("progress", "segment"):
+            return
+        arm = self.running.pop(event.stage).arm
+        if not event.info.get("segments"):
+            self._closed.add(arm.id)
+        if event.kind != "done":
+            emit(replace(event, kind="crashed"))
+
+
 def run_stages(stages: Sequence[Stage], finished: Iterable[str], workers: Workers, emit: Emit) -> None:
     """Carry out every stage that is not finished, each after the stages that it needs.
 
     Everything that happens is emitted; nothing is raised for a stage that fails. Raises PlanError where the stages
     can't all be carried out in some order.
     """
-    schedule, crashes, running = Schedule(stages, finished), Crashes(), dict[str, Stage]()
+    schedule, crashes, helping = Schedule(stages, finished), Crashes(), _Helping()
+    running: dict[str, Stage] = {}
 
     def handle(event: Event) -> None:
-        """Let schedule and crash counts follow an event of a running stage, and emit it."""
+        """Let schedule, crash counts and helpers follow an event, and emit it."""
+        if event.stage in helping.running:
+            helping.note(event, emit)
+            return
         if event.kind == "segment":
             crashes.note_start(event.stage, event.done)
             return
@@ -113,6 +170,8 @@ def run_stages(stages: Sequence[Stage], finished: Iterable[str], workers: Worker
             event = crashes.note_crash(running[event.stage], event.message)
         emit(event)
         if event.kind == "progress":
+            if not event.message:
+                helping.note_progress(event)
             return
         stage = running.pop(event.stage)
         match event.kind:
@@ -124,13 +183,18 @@ def run_stages(stages: Sequence[Stage], finished: Iterable[str], workers: Worker
             case _:
                 schedule.done(stage.id)
 
+    def is_idle() -> bool:
+        return len(running) + len(helping.running) < workers.capacity
+
     with workers:
         while True:
-            while len(running) < workers.capacity and (stage := schedule.take()) is not None:
+            while is_idle() and (stage := schedule.take()) is not None:
                 running[stage.id] = stage
                 workers.submit(stage, crashes.next_attempt(stage))
                 emit(Event(kind="started", stage=stage.id))
-            if not running:
+            while is_idle() and (task := helping.next_help(running.values())) is not None:
+                workers.submit(task, Attempt(first=False, abandoned=crashes.abandoned(task.arm)))
+            if not running and not helping.running:
                 return
             for event in workers.next_events():
                 handle(event)

@@ -19,7 +19,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
-from harness.campaign.plan.stages import External, Stage
+from harness.campaign.plan.stages import AssessmentStage, External, Stage
 from harness.campaign.preflight import OpenCampaign
 from harness.campaign.storage.locks import held_by_worker
 from harness.campaign.storage.run_folder import RunFolder
@@ -29,6 +29,9 @@ from harness.config.persona import Persona
 from harness.drivers.external import ExternalDriver
 from harness.errors import HarnessError, is_of_memory, of_system, short_of_memory
 from harness.files import make_folder
+
+SEGMENT_EPISODES = 5
+"""Games of an arm that are stored together: one worker plays them."""
 
 OnProgress: TypeAlias = Callable[[int, int], None]
 """Called with what is done of a stage, and with its total: steps, games or trials."""
@@ -93,6 +96,23 @@ def run_context_of(
 
 
 @dataclass(frozen=True, kw_only=True)
+class Help:
+    """Playing some segments of an arm that another worker carries out."""
+
+    arm: AssessmentStage
+    number: int
+    """Each help of a run has another one."""
+
+    @property
+    def id(self) -> str:
+        return f"{self.arm.id}+{self.number}"
+
+
+Task: TypeAlias = Stage | Help
+"""What a worker is given."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Attempt:
     """What earlier attempts at a stage, in this run of the command, leave to the next one."""
 
@@ -112,8 +132,8 @@ class StageRun:
     on_start: OnStart = lambda place: None
 
 
-Work: TypeAlias = Callable[[Stage, StageRun], dict[str, Any]]
-"""Carries a stage out and returns its facts for the manifest."""
+Work: TypeAlias = Callable[[Task, StageRun], dict[str, Any]]
+"""Carries a task out: a stage, of which it returns the facts for the manifest, or help."""
 
 
 _PROGRESS_EVERY_S = 0.25
@@ -123,13 +143,14 @@ _LOGGER = logging.getLogger("harness.preparation")
 
 @dataclass(frozen=True, kw_only=True)
 class Event:
-    """Something that happened to a stage."""
+    """Something that happened to a task."""
 
     kind: Literal["started", "progress", "segment", "done", "failed", "crashed", "skipped"]
     """segment: a segment of a training, a game of an arm or a trial of a search starts, and `done` is its number. It
     is for `run_stages` alone and is not emitted. progress with a message: what the stage waits for before its own
     work."""
     stage: str
+    """The task's id."""
     done: int = 0
     total: int = 0
     message: str = ""
@@ -139,11 +160,11 @@ class Event:
 Emit: TypeAlias = Callable[[Event], None]
 
 
-def carry_out_in_worker(stage: Stage, attempt: Attempt, *, context: RunContext, work: Work, send: Emit) -> Event:
-    """Carry a stage out in this process, which is registered in the run folder meanwhile.
+def carry_out_in_worker(task: Task, attempt: Attempt, *, context: RunContext, work: Work, send: Emit) -> Event:
+    """Carry a task out in this process, which is registered in the run folder meanwhile.
 
-    Progress and starts of segments are sent; the last event, done or failed, is returned. What a stage raises is a
-    failure of this stage alone.
+    Progress and starts of segments are sent; the last event, done or failed, is returned. What a task raises is a
+    failure of this task alone.
     """
     last_s = 0.0
 
@@ -152,26 +173,26 @@ def carry_out_in_worker(stage: Stage, attempt: Attempt, *, context: RunContext, 
         now_s = time.monotonic()
         if now_s - last_s >= _PROGRESS_EVERY_S or done >= total:
             last_s = now_s
-            send(Event(kind="progress", stage=stage.id, done=done, total=total))
+            send(Event(kind="progress", stage=task.id, done=done, total=total))
 
     def on_start(place: int) -> None:
-        send(Event(kind="segment", stage=stage.id, done=place))
+        send(Event(kind="segment", stage=task.id, done=place))
 
     def on_preparation(what: str, done: int, total: int) -> None:
-        send(Event(kind="progress", stage=stage.id, done=done, total=total, message=what))
+        send(Event(kind="progress", stage=task.id, done=done, total=total, message=what))
 
     run = StageRun(context=context, attempt=attempt, on_progress=on_progress, on_start=on_start)
     try:
         _put_scratch_into(context.folder)
-        with held_by_worker(context.folder.workers, stage.id, _LOST_S), preparations_reported(on_preparation):
-            return Event(kind="done", stage=stage.id, info=work(stage, run))
+        with held_by_worker(context.folder.workers, task.id, _LOST_S), preparations_reported(on_preparation):
+            return Event(kind="done", stage=task.id, info=work(task, run))
     except (HarnessError, OSError) as error:
         message = of_system(error) if isinstance(error, OSError) else str(error)
-        return Event(kind="failed", stage=stage.id, message=message)
+        return Event(kind="failed", stage=task.id, message=message)
     except Exception as error:
         # the message of a bug is its traceback
         message = short_of_memory(error) if is_of_memory(error) else traceback.format_exc()
-        return Event(kind="failed", stage=stage.id, message=message)
+        return Event(kind="failed", stage=task.id, message=message)
 
 
 @cache

@@ -20,8 +20,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 
 from harness.campaign.execution.run_stage import carry_out
-from harness.campaign.execution.stage_run import Attempt, Event, RunContext, Work, carry_out_in_worker
-from harness.campaign.plan.stages import Stage
+from harness.campaign.execution.stage_run import Attempt, Event, RunContext, Task, Work, carry_out_in_worker
 from harness.errors import limited_memory
 
 _TERMINATING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
@@ -29,7 +28,7 @@ _PROGRAM = "import json, sys; sys.path[:] = json.loads(sys.argv[2]); from {0} im
 
 
 def start_process(work: Work, context: RunContext) -> tuple[subprocess.Popen[bytes], Connection]:
-    """Start a worker. It receives (stage, attempt) and sends events until the connection is closed.
+    """Start a worker. It receives (task, attempt) and sends events until the connection is closed.
 
     Its standard input stays open as long as this process lives. `multiprocessing` starts no worker here: its child
     prints a traceback if the parent is killed before it has sent what the child needs.
@@ -66,7 +65,7 @@ def _signals_delayed() -> Iterator[None]:
 
 
 def serve(descriptor: int) -> None:
-    """Carry out the stages that a connection asks for. What a worker's process runs."""
+    """Carry out the tasks that a connection asks for. What a worker's process runs."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.set_inheritable(descriptor, False)
     threading.Thread(target=_end_with_parent, args=(_taken_input(),), daemon=True).start()
@@ -74,8 +73,8 @@ def serve(descriptor: int) -> None:
     try:
         work, context = connection.recv()
         while True:
-            stage, attempt = connection.recv()
-            last = carry_out_in_worker(stage, attempt, context=context, work=work, send=connection.send)
+            task, attempt = connection.recv()
+            last = carry_out_in_worker(task, attempt, context=context, work=work, send=connection.send)
             connection.send(last)
     except (EOFError, OSError):  # the parent is gone
         return
@@ -107,43 +106,40 @@ def cores() -> int:
 class _Worker:
     process: subprocess.Popen[bytes]
     connection: Connection
-    stage: Stage | None = None
+    task: Task | None = None
 
 
 class WorkerPool:
-    """Processes of this machine, at most `jobs` and no more than `stages_left`; see `run_stages.Workers`.
+    """Processes of this machine, at most `jobs`, each started when it is needed; see `run_stages.Workers`.
 
-    `work` carries out a stage, in a worker.
+    `work` carries out a task, in a worker.
     """
 
-    def __init__(self, context: RunContext, stages_left: int, jobs: int, work: Work = carry_out) -> None:
+    def __init__(self, context: RunContext, jobs: int, work: Work = carry_out) -> None:
         self._context, self._work = context, work
-        self.capacity = min(jobs, stages_left)
+        self.capacity = jobs
         self._workers: list[_Worker] = []
 
-    def submit(self, stage: Stage, attempt: Attempt) -> None:
-        """Give a stage to an idle worker."""
-        worker = next(each for each in self._workers if each.stage is None)
-        worker.stage = stage
+    def submit(self, task: Task, attempt: Attempt) -> None:
+        """Give a task to an idle worker, or to a new one."""
+        worker = next((each for each in self._workers if each.task is None), None)
+        if worker is None:
+            worker = _Worker(*start_process(self._work, self._context))
+            self._workers.append(worker)
+        worker.task = task
         try:
-            worker.connection.send((stage, attempt))
+            worker.connection.send((task, attempt))
         except OSError:  # it died while it was idle
             self._replace(worker)
-            worker.connection.send((stage, attempt))
+            worker.connection.send((task, attempt))
 
     def next_events(self) -> Sequence[Event]:
         """Wait for the busy workers: at most one event of each."""
-        busy = [worker for worker in self._workers if worker.stage]
+        busy = [worker for worker in self._workers if worker.task]
         ready = wait([worker.connection for worker in busy])
         return [self._event_of(worker) for worker in busy if worker.connection in ready]
 
     def __enter__(self) -> WorkerPool:
-        try:
-            while len(self._workers) < self.capacity:
-                self._workers.append(_Worker(*start_process(self._work, self._context)))
-        except BaseException:
-            self.__exit__()
-            raise
         return self
 
     def __exit__(self, *exception: object) -> None:
@@ -154,16 +150,16 @@ class WorkerPool:
 
     def _event_of(self, worker: _Worker) -> Event:
         """The next event of a worker; its crash, if it ended without one."""
-        assert worker.stage is not None
+        assert worker.task is not None
         try:
             event: Event = worker.connection.recv()
         except (EOFError, OSError):  # it closed the connection, so it is ending
             code = self._replace(worker)
             cause = signal.Signals(-code).name if code < 0 else f"exit code {code}"
             limit = f" ({words})" if (words := limited_memory()) else ""  # libraries abort where memory runs out
-            event = Event(kind="crashed", stage=worker.stage.id, message=f"the worker died of {cause}{limit}")
+            event = Event(kind="crashed", stage=worker.task.id, message=f"the worker died of {cause}{limit}")
         if event.kind in ("crashed", "done", "failed"):
-            worker.stage = None
+            worker.task = None
         return event
 
     def _replace(self, worker: _Worker) -> int:

@@ -10,12 +10,13 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from harness.errors import StageFailed
+from harness.errors import HarnessError
+from harness.files import make_folder
 
 _LOCK = "*.lock"
 
 
-class InUse(Exception):
+class InUse(HarnessError):
     """Another process has the lock; the message names it, as far as it is known."""
 
 
@@ -40,14 +41,14 @@ def only_one(file: Path) -> Iterator[None]:
 def held_by_worker(folder: Path, name: str, timeout_s: float) -> Iterator[None]:
     """Register this process in a folder under a name, during the block: `wait_for_workers` waits for that.
 
-    At most one process at a time has a name. Raises StageFailed if another one still has it after `timeout_s`.
+    At most one process at a time has a name. Raises InUse if another one still has it after `timeout_s`.
     """
-    folder.mkdir(exist_ok=True)
+    make_folder(folder)
     with contextlib.ExitStack() as stack:
         try:
             stack.enter_context(_held(folder / f"{name}.lock", timeout_s))
         except Timeout:
-            raise StageFailed(f"{name}: a process that was lost still has its lock, after {timeout_s:g} s") from None
+            raise InUse(f"{name}: a process that was lost still has its lock, after {timeout_s:g} s") from None
         yield
 
 

@@ -32,7 +32,7 @@ from tests.support.tiny import (
 
 def run(folder: Path, stages: list[Stage], work: Any, jobs: int = 2) -> list[Event]:
     events: list[Event] = []
-    run_stages(stages, [], WorkerPool(empty_context(folder), len(stages), jobs, work), events.append)
+    run_stages(stages, [], WorkerPool(empty_context(folder), jobs, work), events.append)
     return events
 
 
@@ -72,7 +72,7 @@ def die_in_b(stage: Stage, run: StageRun) -> dict[str, Any]:
 def die_when_idle(stage: Stage, run: StageRun) -> dict[str, Any]:
     """Kill whoever else works for the same parent: it has nothing to do."""
     if stage.id == "a-seed1":
-        time.sleep(0.5)  # until the other worker waits for its first stage
+        time.sleep(0.5)  # until the other worker has nothing to do
         for pid in workers_of(os.getppid()):
             if pid != os.getpid():
                 os.kill(pid, signal.SIGKILL)
@@ -123,8 +123,8 @@ def test_run_stages__a_stage_that_always_kills_its_worker_fails_by_name(tmp_path
 
 
 def test_run_stages__a_worker_that_dies_with_nothing_to_do_is_replaced(tmp_path: Path) -> None:
-    events = run(tmp_path, [stage("a"), stage("b", "a"), stage("c", "a")], die_when_idle)
-    assert sorted(told(events, "done")) == ["a", "b", "c"]
+    events = run(tmp_path, [stage("a"), stage("b"), stage("c", "a", "b"), stage("d", "a", "b")], die_when_idle)
+    assert sorted(told(events, "done")) == ["a", "b", "c", "d"]
 
 
 def test_run_stages__a_worker_that_dies_under_a_limit_of_memory_names_the_limit(

@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 from harness.campaign.storage.locks import InUse, held_by_worker, is_held, only_one, wait_for_workers
-from harness.errors import StageFailed
 from tests.support.repository import REPOSITORY
 
 HOLD = """
@@ -59,7 +58,7 @@ def test_workers__are_waited_for_and_one_at_a_time_has_a_stage(tmp_path: Path) -
     for stage in ("a-seed1", "c-seed1"):
         with holder(workers, stage):
             expected = rf"^{stage}: a process that was lost still has its lock, after 0\.1 s$"
-            with pytest.raises(StageFailed, match=expected), held_by_worker(workers, stage, 0.1):
+            with pytest.raises(InUse, match=expected), held_by_worker(workers, stage, 0.1):
                 pytest.fail("two at once")
             with held_by_worker(workers, "b-seed1", 0.1):
                 pass
