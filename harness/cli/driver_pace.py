@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 from harness.assessment.conformance import Findings
+from harness.campaign.execution.stage_run import SEGMENT_EPISODES
+from harness.campaign.execution.worker_pool import cores
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage, SearchStage, TrainingStage
 from harness.config.campaign import Campaign, Ego
@@ -10,7 +14,7 @@ from harness.reports.numbers import duration, steps_text
 
 
 def pace_lines(findings: Findings, written: str) -> list[str]:
-    """What an arm and a campaign with one person take in one process; nothing of a driver with violations."""
+    """What an arm takes in one process, and a campaign with one person here; nothing of a driver with violations."""
     if not findings.game_seconds or findings.violations:
         return []
     game_s = sum(findings.game_seconds) / len(findings.game_seconds)
@@ -18,7 +22,8 @@ def pace_lines(findings: Findings, written: str) -> list[str]:
     stages = plan(campaign, ["person"], findings.tunable)
     games = campaign.assessment.episodes
     arms = sum(isinstance(each, AssessmentStage) and bool(each.ego) for each in stages)
-    parts = [f"{arms} arms {duration(arms * games * game_s)}"]
+    rounds = math.ceil(arms * math.ceil(games / SEGMENT_EPISODES) / cores())  # segments, as many at a time as cores
+    parts = [f"{arms} arms {duration(rounds * SEGMENT_EPISODES * game_s)} in as many processes as cores ({cores()})"]
     for stage in stages:
         if isinstance(stage, SearchStage):
             searched = campaign.reconfiguration.trials * campaign.reconfiguration.games

@@ -94,7 +94,8 @@ KeepGoing = Annotated[
     ),
 ]
 Jobs = Annotated[
-    int | None, typer.Option(min=1, metavar="N", help="Number of stages run in parallel.  [default: one per core]")
+    int | None,
+    typer.Option(min=1, metavar="N", help="Number of processes that carry out stages.  [default: one per core]"),
 ]
 
 Ray = Annotated[

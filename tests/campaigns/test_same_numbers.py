@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import pty
+import shutil
 import subprocess
+import sys
 import threading
 from pathlib import Path
 from typing import Any
@@ -16,8 +18,10 @@ import pytest
 from harness.evaluation.tables import read_csv
 from tests.support.tiny import (
     BY_SUMO,
+    CAREFUL,
     HARNESS,
     PATIENCE_S,
+    POLICIES,
     SPEEDY,
     TABLES,
     carried_out,
@@ -103,3 +107,43 @@ def test_numbers__neither_another_persona_nor_the_order_of_personas_changes_a_ro
         pd.testing.assert_frame_equal(first, second, check_exact=True)
     pd.testing.assert_frame_equal(rows_of(runs[0], "speedy"), rows_of(sumo_run(), "speedy"))
     assert set(rows_of(runs[0], "anna")["arm"]) == {"naive_alone", "naive_vs_sumo", "anna_alone", "naive_vs_anna"}
+
+
+TOGETHER = """
+import json, os, sys, time
+games = 0
+for line in sys.stdin:
+    message = json.loads(line)
+    if message["type"] == "reset":
+        games += 1
+        if games == 2:
+            open(f"playing/{os.getpid()}", "w").close()
+        while games == 2 and len(os.listdir("playing")) < int(open("players").read()):
+            time.sleep(0.01)
+    rows = len(message.get("games", ()))
+    print(json.dumps({"protocol": 2, "actions": [[0.0, 0.0]] * rows}), flush=True)
+"""
+"""A driver that waits in its second game until as many of its processes as `players` says play at the same time."""
+
+
+def test_numbers__of_an_arm_that_two_workers_play_are_those_of_one(tmp_path: Path) -> None:
+    """The arm is the only stage that is left; its ego is a program."""
+    ego, runs = tmp_path / "ego", [tmp_path / "one", tmp_path / "two"]
+    (ego / "playing").mkdir(parents=True)
+    (ego / "drive.py").write_text(TOGETHER)
+    (ego / "ego.toml").write_text(
+        f'kind = "process"\ncommand = [{sys.executable!r}, "drive.py"]\nstart_deadline_s = {PATIENCE_S}\n'
+    )
+    changes: dict[str, Any] = {"training": None, "policies": str(POLICIES), "assessment": {"episodes": 10}}
+    campaign = write_campaign(tmp_path, ego={"driver": "ego/ego.toml", "persona": str(CAREFUL)}, **changes)
+    (ego / "players").write_text("1")
+    carried_out(campaign, runs[0], "--allow-code")
+    shutil.copytree(runs[0], runs[1])
+    (runs[1] / ".stages" / "naive_vs_speedy-seed1" / "done.json").unlink()
+    for each in (ego / "playing").iterdir():
+        each.unlink()
+    (ego / "players").write_text("2")
+    carried_out(campaign, runs[1], "--allow-code", "--jobs", 2)
+    assert len(list((ego / "playing").iterdir())) == 2
+    assert numbers(runs[1]) == numbers(runs[0])
+    assert set(read_csv(runs[1] / "episodes.csv")["error"]) == {""}

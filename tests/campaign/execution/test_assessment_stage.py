@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from harness.assessment.rollout import SeatedArm
 from harness.campaign.execution.assessment_stage import Segment, join_segments, play_segments, segments_of
 from harness.campaign.execution.stage_run import Attempt, StageRun
 from harness.campaign.storage.arm_tables import PLAYED
+from harness.campaign.storage.locks import held_by_worker
 from harness.drivers.sumo import SumoDriver
 from harness.errors import StageFailed
 from harness.evaluation.tables import read_csv
@@ -104,6 +106,15 @@ def test_arm__a_game_that_is_given_up_is_an_error_and_the_others_are_played(
     ]
     assert table.drop(4).equals(expected.drop(4))
     assert [episode for episode, _ in read_traces(tmp_path / "traces.parquet")] == [0, 1, 2, 3, 5, 6]
+
+
+def test_arm__plays_what_another_worker_leaves_at_last(steady: SeatedArm, whole: Path, tmp_path: Path) -> None:
+    """Another worker has the segment from game 3, and ends without it while game 6 is played."""
+    with ExitStack() as another:
+        another.enter_context(held_by_worker(tmp_path / ".stages" / "worker_locks", f"{steady.name}-seed1.000003", 0.0))
+        _, played = play(steady, tmp_path, on_start=lambda episode: another.close() if episode == 6 else None)
+    assert played == [0, 1, 2, 6, 3, 4, 5]
+    assert files(tmp_path) == files(whole)
 
 
 class Raises(Steady):

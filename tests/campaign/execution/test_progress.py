@@ -65,6 +65,19 @@ def test_elsewhere__a_running_stage_has_a_line_each_minute_with_the_time_left() 
     ]
 
 
+def test_elsewhere__games_that_take_minutes_have_a_line_each_with_the_time_left() -> None:
+    console, seconds = Console(file=io.StringIO(), width=160), 0.0
+    arm = next(stage for stage in STAGES if stage.unit == "episodes")
+    with StageProgress(STAGES, 0, console, clock=lambda: seconds) as progress:
+        progress.show(Event(kind="started", stage=arm.id))
+        for game in range(4):
+            seconds = 150.0 * game
+            progress.show(Event(kind="progress", stage=arm.id, done=game, total=100))
+    assert console.file.getvalue().splitlines()[-1] == (  # type: ignore[attr-defined]
+        f"running  {arm.id}: 3 of 100 episodes, 4:02:30 left"
+    )
+
+
 def test_preparations__are_the_log_of_what_is_prepared(caplog: pytest.LogCaptureFixture) -> None:
     told, log = [], logging.getLogger("harness.preparation")
     with preparations_reported(lambda *what: told.append(what)):

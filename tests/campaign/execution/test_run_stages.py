@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 import pytest
 
 from harness.campaign.execution.run_stages import MOST_CRASHES, Attempt, run_stages
-from harness.campaign.execution.stage_run import Event
-from harness.campaign.plan.stages import Stage
+from harness.campaign.execution.stage_run import SEGMENT_EPISODES, Event, Task
+from harness.campaign.plan.stages import AssessmentStage, Stage
+from harness.evaluation.strategies import Arm, NaiveEgo
 from tests.support.plans import training_of as stage
 
 
@@ -19,12 +20,14 @@ class Scripted:
         self.capacity, self.most_running = capacity, 0
         self._script = {f"{name}-seed1": list(attempts) for name, attempts in (script or {}).items()}
         self.running: list[str] = []
+        self.submitted: list[str] = []
         self.attempts: list[Attempt] = []
         self.entered = self.left = False
 
-    def submit(self, stage: Stage, attempt: Attempt) -> None:
+    def submit(self, task: Task, attempt: Attempt) -> None:
         assert self.entered
-        self.running.append(stage.id)
+        self.running.append(task.id)
+        self.submitted.append(task.id)
         self.most_running = max(self.most_running, len(self.running))
         self.attempts.append(attempt)
 
@@ -86,6 +89,45 @@ def test_run_stages__too_many_crashes_fail_the_stage_and_skip_what_needs_it() ->
     said = run([stage("a"), stage("b", "a"), stage("c")], workers)
     assert said.count("crashed a") == MOST_CRASHES - 1
     assert said[-4:] == ["failed a", "skipped b", "started c", "done c"]
+
+
+ARM = AssessmentStage(seed=1, persona="", arm=Arm(ego=NaiveEgo()), ego=(), non_ego=())
+
+
+def helped_arm(left: int, *ends: Event) -> tuple[list[str], list[str]]:
+    """An arm that reports how many games are left, in a pool of four; its helpers end as given, then it does. What is
+    emitted, and what is submitted."""
+    progress = Event(kind="progress", stage=ARM.id, done=100 - left, total=100)
+    reports, workers, events = [progress, *ends, Event(kind="done", stage=ARM.id)], Scripted(4), list[Event]()
+    workers.next_events = lambda: [reports.pop(0)]  # type: ignore[method-assign]
+    run_stages([ARM], [], workers, events.append)
+    assert not reports
+    return [f"{each.kind} {each.stage}" for each in events if each.kind != "progress"], workers.submitted
+
+
+def helper(number: int, kind: str, **info: int) -> Event:
+    return Event(kind=kind, stage=f"{ARM.id}+{number}", info=info)  # type: ignore[arg-type]
+
+
+def test_idle_workers__help_with_an_arm_by_no_more_than_its_segments() -> None:
+    nothing = [helper(number, "done", segments=0) for number in (1, 2, 3)]
+    emitted, submitted = helped_arm(100, *nothing)
+    assert emitted == [f"started {ARM.id}", f"done {ARM.id}"]
+    assert submitted == [ARM.id, *(f"{ARM.id}+{number}" for number in (1, 2, 3))]
+    assert helped_arm(SEGMENT_EPISODES + 1, nothing[0])[1] == [ARM.id, f"{ARM.id}+1"]
+    assert helped_arm(SEGMENT_EPISODES)[1] == [ARM.id]
+
+
+def test_idle_workers__help_again_while_there_are_segments() -> None:
+    _, submitted = helped_arm(2 * SEGMENT_EPISODES, helper(1, "done", segments=1), helper(2, "done", segments=0))
+    assert submitted == [ARM.id, f"{ARM.id}+1", f"{ARM.id}+2"]
+
+
+@pytest.mark.parametrize("kind", ["crashed", "failed"])
+def test_idle_workers__that_crash_or_fail_are_told_and_their_arm_goes_on_alone(kind: str) -> None:
+    emitted, submitted = helped_arm(2 * SEGMENT_EPISODES, helper(1, kind))
+    assert emitted == [f"started {ARM.id}", f"crashed {ARM.id}+1", f"done {ARM.id}"]
+    assert submitted == [ARM.id, f"{ARM.id}+1"]
 
 
 def test_run_stages__workers_end_where_an_event_can_not_be_emitted() -> None:
