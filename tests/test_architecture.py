@@ -228,7 +228,7 @@ def test_checking__loads_no_learner_and_no_statistics() -> None:
 
 def test_help__loads_no_numerics() -> None:
     """Help and the completion of a shell answer at once."""
-    assert loaded_with("harness.cli.main").isdisjoint(LEARNERS | {"numpy", "numba", "pandas", "pydantic", "sumolib"})
+    assert loaded_with("harness.cli.app").isdisjoint(LEARNERS | {"numpy", "numba", "pandas", "pydantic", "sumolib"})
 
 
 def test_resuming__loads_no_learner_and_no_statistics() -> None:

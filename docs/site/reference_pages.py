@@ -14,7 +14,7 @@ from typing import Any
 import typer
 
 import harness
-from harness.cli.main import app
+from harness.cli.app import app
 from harness.config.json_schema import DOCUMENTS
 from harness.shipped_documents import shipped, shipped_names
 

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from harness.road.scene.open_scene import OpenScene
 
 NOTHING_TO_SHORTEN = "Nothing to shorten: the players are already trained. All games are played."
-INTERRUPTED = "Interrupted. Finished work is kept: run the same command again to continue."
 NOTHING_TO_TUNE = "It has nothing to train or to tune: the campaign has rounds 0 and 1 only."
 
 

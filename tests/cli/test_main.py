@@ -18,13 +18,22 @@ from junitparser import JUnitXml
 from harness.campaign.plan.plan import plan
 from harness.campaign.preflight import open_campaign
 from harness.campaign.storage.run_folder import RunFolder
-from harness.cli import main as cli
 from harness.cli import messages
-from harness.cli.main import INTERRUPTED, app
+from harness.cli.app import app
+from harness.cli.main import INTERRUPTED, main
 from harness.errors import FAILED, NOT_ACCEPTED, USAGE_ERROR, SimulationError
 from harness.evaluation.tables import read_csv
 from harness.evaluation.worst_first import FAILURES
-from tests.support.tiny import TABLES, learned_run, sumo_run, tables, write_campaign
+from tests.support.tiny import (
+    TABLES,
+    assert_interrupted,
+    begin,
+    learned_run,
+    sumo_run,
+    tables,
+    wait_for,
+    write_campaign,
+)
 
 
 class Result(NamedTuple):
@@ -44,7 +53,7 @@ def run_command(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[s
     def run(*arguments: object) -> Result:
         monkeypatch.setattr("sys.argv", ["harness", *map(str, arguments)])
         with pytest.raises(SystemExit) as stopped:
-            cli.main()
+            main()
         code = stopped.value.code
         return Result(0 if code is None else int(code), *capsys.readouterr())
 
@@ -84,7 +93,7 @@ def test_help__describes_the_command_and_its_parameters(command: str, run_comman
 def test_help__names_the_exit_codes(run_command: Callable[..., Result]) -> None:
     shown = words_of(run_command("--help").out)
     assert words_of(str(app.info.epilog)) in shown
-    for code in (FAILED, USAGE_ERROR, NOT_ACCEPTED, INTERRUPTED):
+    for code in (FAILED, USAGE_ERROR, NOT_ACCEPTED, 128 + signal.SIGINT, 128 + signal.SIGTERM):
         assert str(code) in str(app.info.epilog)
 
 
@@ -127,7 +136,7 @@ def test_report__judges_the_bounds_of_the_campaign(
     run = shutil.copytree(sumo_run(), tmp_path / "run")
     manifest = json.loads((run / "manifest.json").read_text(encoding="utf-8"))
     manifest["campaign"]["acceptance"] = {"failure_rate": bound, "failure_rate_alone": 1.0}
-    (run / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
+    RunFolder(run).write_manifest(manifest)
     RunFolder(run).results.unlink()  # they are of the manifest before
     result = run_command("report", run)
     assert result.code == code, result.err
@@ -191,21 +200,31 @@ def test_main__an_error_of_sumo_is_one_message(
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGINT, 130)])
-def test_campaign__ended_while_it_is_read_says_that_it_continues(
-    number: signal.Signals, code: int, run_command: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
+def test_campaign__ended_while_it_loads_its_modules_says_that_it_continues(
+    number: signal.Signals, code: int, tmp_path: Path
 ) -> None:
-    at_start = {
-        signal.SIGTERM: signal.SIG_DFL,
-        signal.SIGHUP: signal.SIG_DFL,
-        signal.SIGINT: signal.default_int_handler,
-    }
-    before = {each: signal.signal(each, handler) for each, handler in at_start.items()}
-    monkeypatch.setattr(cli, "document_at", lambda *_: signal.raise_signal(number))
+    process = begin("campaign", "merge", "--out", tmp_path / "run")
+    wait_for(lambda: caught_by(process.pid) >> (signal.SIGHUP - 1) & 1, "the handlers of the signals")
+    process.send_signal(number)
+    assert_interrupted(process, code)
+    assert not (tmp_path / "run").exists()
+
+
+def caught_by(pid: int) -> int:
+    """The signals that a process handles, a bit for each."""
+    status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8")
+    return int(re.findall(r"^SigCgt:\t(\w+)", status, re.MULTILINE)[0], 16)
+
+
+def test_command__that_keeps_no_work_says_only_that_it_was_interrupted(
+    run_command: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    monkeypatch.setattr("harness.cli.documents.check_scene", lambda *_: signal.raise_signal(signal.SIGTERM))
     try:
-        assert run_command("campaign", "merge") == (code, f"{messages.INTERRUPTED}\n", "")
+        assert run_command("check", "networks/merge") == (143, "", f"{INTERRUPTED}\n")
     finally:
-        for each, handler in before.items():
-            signal.signal(each, handler)
+        signal.signal(signal.SIGTERM, before)
 
 
 @pytest.mark.parametrize("arguments", [("campaign", "merge"), ("report", "nowhere")])
@@ -250,4 +269,4 @@ def test_main__a_bug_has_a_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("harness.campaign.results.results.write_results", bug)
     monkeypatch.setattr("sys.argv", ["harness", "report", str(learned_run())])
     with pytest.raises(KeyError, match="a bug"):
-        cli.main()
+        main()

@@ -15,7 +15,7 @@ import sumo
 from typer.testing import CliRunner
 
 from harness.campaign.preflight import open_campaign
-from harness.cli.main import app
+from harness.cli.app import app
 from harness.cli.scene_writing import write_scenes
 from harness.errors import UsageError
 from harness.game.initial_state import draw_initial_state

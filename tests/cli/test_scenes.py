@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from harness.cli.main import app
+from harness.cli.app import app
 from harness.errors import UsageError
 from tests.support.repository import REPOSITORY
 from tests.support.scenes import CROSSING_EDGES, CROSSING_NODES

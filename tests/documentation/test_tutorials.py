@@ -12,7 +12,7 @@ import pytest
 import typer
 from jsonschema import Draft202012Validator
 
-from harness.cli.main import app
+from harness.cli.app import app
 from tests.support.repository import REPOSITORY
 
 if sys.version_info >= (3, 11):

@@ -24,7 +24,7 @@ from typing import IO, NoReturn
 from tests.support.repository import REPOSITORY
 
 PRELOADED = (
-    "harness.cli.main",
+    "harness.cli.app",
     "harness.cli.documents",
     "harness.cli.runs",
     "harness.campaign.results.results",

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from harness.campaign.storage.run_log import LOG
-from harness.cli.messages import INTERRUPTED
+from harness.cli.main import CONTINUES
 from harness.config.training import Training
 from harness.errors import NOT_ACCEPTED
 from tests.support.forked_command import can_fork, run_forked
@@ -167,7 +167,7 @@ def assert_interrupted(process: subprocess.Popen[str], code: int) -> None:
     """The command ends with this exit code and one message, and leaves no process."""
     printed = process.communicate(timeout=PATIENCE_S)[0]
     assert process.returncode == code, printed
-    assert printed.splitlines()[-1] == INTERRUPTED
+    assert printed.splitlines()[-1] == CONTINUES
     assert "Traceback" not in printed
     wait_until_nothing_is_left(process)
 
