@@ -85,7 +85,7 @@ def test_report__quiet_prints_nothing_if_nothing_failed(run: Path) -> None:
 def test_report__quiet_prints_what_failed(run: Path) -> None:
     manifest = json.loads((run / "manifest.json").read_text(encoding="utf-8"))
     manifest["stages"]["naive_alone-seed1"] |= {"status": "failed", "message": "a.parquet: No space left on device"}
-    (run / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
+    RunFolder(run).write_manifest(manifest)
     RunFolder(run).results.unlink()  # they are of the manifest before
     done = harness("report", run, "-q")
     assert (done.returncode, done.stdout) == (

@@ -14,6 +14,7 @@ import stat
 import tempfile
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,6 +27,7 @@ from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.run_log import LOG
 from harness.cli.main import main
 from harness.drivers.policy_file import write_policy
+from harness.errors import UsageError
 from tests.support.policies import some_policy
 from tests.support.repository import REPOSITORY
 from tests.support.shared import built_once
@@ -291,6 +293,8 @@ def _build_run(folder: Path) -> None:
 
 def seal(run: Path) -> None:
     """Make the checksums of a run folder fit its files: who changes a file on purpose can change those as well."""
+    with suppress(UsageError):
+        RunFolder(run).write_manifest(RunFolder(run).manifest())
     for record in (run / ".stages" / "results.json", *run.glob(".stages/*/done.json")):
         if record.is_file():
             document = json.loads(record.read_text(encoding="utf-8"))

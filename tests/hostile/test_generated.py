@@ -147,7 +147,7 @@ def test_manifest__with_an_odd_value_somewhere(folder: Path, data: st.DataObject
     run = folder / "run"
     shutil.rmtree(run, ignore_errors=True)
     (run / ".stages" / "naive-seed1").mkdir(parents=True)
-    (run / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
+    RunFolder(run).write_manifest(manifest)
     files = ("run/manifest.json", "done.json")  # the stages have no files here: those that are done are named
     in_order_or_refused(lambda: RunFolder(run).check_whole(RunFolder(run).manifest()), *files)
 

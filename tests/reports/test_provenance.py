@@ -40,13 +40,11 @@ def test_mixed_versions__names_only_the_differences_of_stages_that_are_done() ->
 @pytest.mark.parametrize("command", ["report", "campaign"])
 def test_run__that_mixes_versions_warns_on_the_terminal_and_on_the_page(command: str, tmp_path: Path) -> None:
     run = shutil.copytree(sumo_run(), tmp_path / "run")
-    for file, keys in ((run / "manifest.json", ("stages", "speedy-seed1")), (done_of(run), ("info",))):
-        document = json.loads(file.read_text())
-        entry = document
-        for key in keys:
-            entry = entry[key]
+    manifest, done = RunFolder(run).manifest(), json.loads(done_of(run).read_text())
+    for entry in (manifest["stages"]["speedy-seed1"], done["info"]):
         entry["versions"][0]["numpy"] = "1.0"
-        file.write_text(json.dumps(document))
+    RunFolder(run).write_manifest(manifest)
+    done_of(run).write_text(json.dumps(done))
     RunFolder(run).results.unlink()  # they are of the manifest before
     more = ("report", run) if command == "report" else ("campaign", sumo_run().with_suffix(".toml"), "--out", run)
     done = harness(*more)

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field, ValidationError, model_validator
 
 from harness.campaign.plan.stages import stage_id
+from harness.campaign.storage.checksums import digest_of
 from harness.config.campaign import Campaign, CampaignName, Seed
 from harness.config.persona import Persona
 from harness.config.scene import Name
@@ -117,6 +118,11 @@ def read_manifest(file: Path, content: bytes) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         words = str(error)
     raise UsageError.of(file, "", f"is damaged: {words}", RUN_AGAIN)
+
+
+def checksum_of_content(manifest: Mapping[str, Any]) -> str:
+    """SHA-256 of what a manifest holds beside its key `sha256`, which states it."""
+    return digest_of({key: value for key, value in manifest.items() if key != "sha256"})
 
 
 def is_tuned(manifest: Mapping[str, Any]) -> bool:

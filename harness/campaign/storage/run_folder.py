@@ -31,7 +31,7 @@ from typing import Any
 from harness.campaign.plan.stages import stage_id
 from harness.campaign.storage.checksums import mismatches, read_checksums, write_checksums
 from harness.campaign.storage.locks import InUse, only_one, wait_for_workers
-from harness.campaign.storage.manifest import RUN_AGAIN, StageEntry, read_manifest
+from harness.campaign.storage.manifest import RUN_AGAIN, StageEntry, checksum_of_content, read_manifest
 from harness.campaign.storage.run_log import LOG, run_log
 from harness.errors import Problem, UsageError
 from harness.files import content_of, drop_scratch, has_digest, leads_out, make_folder, write_atomically
@@ -178,13 +178,13 @@ class RunFolder:
 
     def check_whole(self, manifest: Mapping[str, Any]) -> None:
         """Raises UsageError where files of the stages are missing, as in a folder that was published without them, or
-        are not what the stages wrote, and where the manifest is not that of the results."""
+        are not what the stages wrote, and where the manifest is not what the campaign wrote."""
         self.check_unpublished(manifest)
-        damaged: list[Path] = []
+        damaged = [] if manifest.get("sha256") == checksum_of_content(manifest) else [self.manifest_file]
         for name in (name for name, entry in manifest["stages"].items() if entry["status"] == "done"):
             record = self.done(name)
             damaged += [self.work(name) / "done.json"] if record is None else mismatches(record, self.path)
-        _refuse([*damaged, *self._changed_scene(manifest), *self._changed_results(MANIFEST)], _RUN)
+        _refuse([*damaged, *self._changed_scene(manifest)], _RUN)
 
     def check_unpublished(self, manifest: Mapping[str, Any]) -> None:
         """Raises UsageError for a published folder."""
@@ -219,7 +219,9 @@ class RunFolder:
     def _changed_scene(self, manifest: Mapping[str, Any]) -> list[Path]:
         return [file for file in sorted(self.scene.glob("*")) if not has_digest(file, manifest["hashes"].values())]
 
-    def write_manifest(self, manifest: Mapping[str, Any]) -> None:
+    def write_manifest(self, manifest: dict[str, Any]) -> None:
+        """Write the manifest, which gets the checksum of its content."""
+        manifest["sha256"] = checksum_of_content(manifest)
         write_atomically(self.manifest_file, (json.dumps(manifest, indent=2) + "\n").encode())
 
     def claim(self, campaign: str, quick: bool = False) -> None:

@@ -95,6 +95,13 @@ def test_read__a_manifest_that_was_edited_is_refused(reader: Callable[[Path], ob
     assert said == f"{run / 'manifest.json'}: is missing, or is not what the campaign wrote (run the campaign again)"
 
 
+def test_report__a_manifest_that_was_edited_before_the_first_results_is_refused(run: Path) -> None:
+    unfinished(run)
+    edited(run / "manifest.json", '"significance": 0.01', '"significance": 0.2')
+    said = refusal(report, run)
+    assert said == f"{run / 'manifest.json'}: is missing, or is not what the campaign wrote (run the campaign again)"
+
+
 @pytest.mark.parametrize("reader", READERS.values(), ids=READERS)
 def test_read__a_campaign_that_has_not_ended_has_no_results_and_then_no_games(
     reader: Callable[[Path], object], run: Path
