@@ -27,7 +27,7 @@ from harness.files import write_atomically
 
 ROOT = Path(__file__).parents[2]
 PUBLISHED = Path(__file__).with_name("published.toml")
-LONG_TABLES = ("episodes", "training")
+LONG_TABLES = ("conduct", "episodes", "training")
 DOCUMENTS = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 
 

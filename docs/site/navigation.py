@@ -38,7 +38,7 @@ SECTIONS = {
         "testing",
         "reliability",
     ),
-    "Results": ("reproduction", "performance"),
+    "Results": ("reproduction", "realism", "performance"),
     "Reference": (
         "reference/cli",
         "reference/api",

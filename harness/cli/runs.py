@@ -1,15 +1,22 @@
-"""The commands for a run that has ended: `harness replay`, `export`, `serve` and `compare`."""
+"""The commands for a run that has ended: `harness replay`, `export`, `serve`, `compare` and `realism`."""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from harness.cli import messages
 from harness.cli.output import AsJson, RunPath, output, print_json, print_plain, say_unchecked
-from harness.errors import UsageError
+from harness.errors import UsageError, plain
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from harness.reports.human_ranges import HumanRow
 
 _STYLES = {"harm": "red", "mended": "green", "open": "default"}
 
@@ -175,3 +182,41 @@ def compare(
     for row in rows:
         print_plain([row.sentence], console, _STYLES[row.tone])
     print_plain([headline(rows), f"Comparison: {page}"], console)
+
+
+def realism(run: RunPath, as_json: AsJson = False) -> None:
+    """Compare how the egos and the people of a run drive with published figures of people.
+
+    The median over a player's games, and the middle 90 % of them, beside the range of people: changes of lane, gaps,
+    speed, braking, steering, red lights, and crashes per kilometre alone.
+    """
+    with output(as_json) as console:
+        from harness.campaign.results.read_run import result_table
+        from harness.campaign.storage.run_folder import RunFolder
+        from harness.reports.human_ranges import comparable, headline, human_rows
+
+        table = result_table(RunFolder(run), "realism")
+        say_unchecked(run, console)
+        if as_json:
+            print_json(json.loads(table.to_json(orient="records")))
+            return
+        console.print(_beside_people(human_rows(table)))
+        left = len(table) - len(comparable(table))
+        more = f"Not comparable: {left} more figures; realism.csv in the run folder has them all, with their sources."
+        print_plain([headline(table), *([more] if left else [])], console)
+
+
+def _beside_people(rows: Sequence[HumanRow]) -> Table:
+    from rich.box import SIMPLE
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=SIMPLE, padding=(0, 1, 0, 0), header_style="bold")
+    for heading in ("player", "figure", "games", "value (90 % of the games)", "people", ""):
+        table.add_column(heading, overflow="fold")
+    last = ""
+    for row in rows:
+        player, last = "" if row.player == last else row.player, row.player
+        words = (player, row.figure, str(row.games), f"{row.value} ({row.spread})", row.people, row.realistic)
+        table.add_row(*(Text(plain(cell)) for cell in words), style="red" if row.is_outside else "")
+    return table

@@ -10,7 +10,7 @@ COUNT, NUMBER, MAYBE = "int64", "float64", "Int64"
 """The pandas dtypes of columns; `MAYBE`: whole numbers or empty."""
 SHARE, POINTS, P_VALUE, OF_METRIC = "share", "difference of shares", "p", "that of the metric"
 """Units that pages show in their own way: in percent, in percentage points, as a p-value, and by the row's metric."""
-_UNITS = {"_mps2": "m/s²", "_s2": "s²", "_mps": "m/s", "_m": "m", "_s": "s"}
+_UNITS = {"_per_s": "1/s", "_mps3": "m/s³", "_mps2": "m/s²", "_s2": "s²", "_mps": "m/s", "_m": "m", "_s": "s"}
 
 
 @dataclass(frozen=True)

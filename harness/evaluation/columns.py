@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from harness.evaluation.column import COUNT, FLAG, MAYBE, NUMBER, OF_METRIC, P_VALUE, POINTS, SHARE, TEXT, Column
-from harness.evaluation.measured_game import METRICS_OF_GAMES, METRICS_OF_PLAYERS
+from harness.evaluation.measured_game import METRICS_OF_CONDUCT, METRICS_OF_GAMES, METRICS_OF_PLAYERS
 
 _EXACT, _T = "95 % Clopper-Pearson interval", "95 % t interval"
 _PAPER = "the paper, section 4.2"
@@ -18,6 +18,7 @@ EPISODE = Column("episode", COUNT, "The game. Equal numbers begin alike in every
 _GAME = (ARM, PERSONA, SEED, EPISODE)
 _EGO_FAILED = Column("ego_failed", MAYBE, "1 if the ego did not reach its goal, else 0.", source="the paper, section 4")
 _ERROR = Column("error", TEXT, "Why the game could not be played; empty if it was.")
+_PLAYER = Column("player", TEXT, "`ego`, `non_ego`, `non_ego_2` and so on.")
 _EPISODES = Column("episodes", COUNT, "Games of the arm.", label="games")
 _PAIRS = (
     Column("pairs", COUNT, "Games of both arms that are compared, with the same start."),
@@ -109,13 +110,33 @@ _TABLES = {
     ),
     "manoeuvres": (
         *_GAME,
-        Column("player", TEXT, "Who performs it."),
+        _PLAYER,
         Column("manoeuvre", TEXT, "Its name in docs/manoeuvres.md."),
         Column("time_s", NUMBER, "When it begins."),
         Column("until_s", NUMBER, "When it ends."),
         Column("gap_m", NUMBER, "Gap to the leader; of a body that enters a lane, to the follower."),
         Column("ttc_s", NUMBER, "Time to collision, of the same two."),
         Column("text", TEXT, "What it was, in words."),
+    ),
+    "conduct": (
+        *_GAME,
+        _PLAYER,
+        Column("outcome", TEXT, "How the player's game ended; empty if the ego's game ended before."),
+        *(each.column for each in METRICS_OF_CONDUCT),
+    ),
+    "realism": (
+        Column("player", TEXT, "The ego or the persona."),
+        Column("figure", TEXT, "A column of `conduct.csv`, a share of its games, or `crashes_per_million_km`."),
+        Column("games", COUNT, "Games in which it could be measured."),
+        Column("measured_in", TEXT, "`alone on the road`, or `all` games."),
+        Column("value", NUMBER, "The median over the games, their share, or the rate.", unit=OF_METRIC),
+        Column("low", NUMBER, "5 % of the games are below it; of the rate, 95 % low.", unit=OF_METRIC),
+        Column("high", NUMBER, "5 % of the games are above it; of the rate, 95 % high.", unit=OF_METRIC),
+        Column("people_low", NUMBER, "The low end of the range of people; empty: none.", unit=OF_METRIC),
+        Column("people_high", NUMBER, "The high end of the range of people; empty: none.", unit=OF_METRIC),
+        Column("realistic", TEXT, "`inside`, `outside` or `not comparable`: value, and of the rate its low end."),
+        Column("reason", TEXT, "Why it is not comparable; else empty."),
+        Column("source", TEXT, "Where the range of people comes from."),
     ),
     "summary": tuple(_summary()),
     "comparisons": (

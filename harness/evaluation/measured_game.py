@@ -1,9 +1,10 @@
-"""The row of `episodes.csv` of one recorded game: outcomes and metrics."""
+"""The rows of `episodes.csv` and `conduct.csv` of one recorded game: outcomes and metrics."""
 
 from __future__ import annotations
 
 from typing import Any
 
+from harness.evaluation import conduct  # enters its metrics
 from harness.evaluation.metrics import METRICS, Drive
 from harness.evaluation.people import COLLIDED_WITH
 from harness.evaluation.recorded_game import RecordedGame
@@ -12,17 +13,27 @@ from harness.game.outcome import Outcome
 from harness.game.roles import EGO, ROLES
 
 METRICS_OF_PLAYERS = tuple(each for each in METRICS if {"ego", "person"} & {*each.whose})
-METRICS_OF_GAMES = tuple(each for each in METRICS if each not in METRICS_OF_PLAYERS)
-assert measures  # used for what its import enters
+METRICS_OF_CONDUCT = tuple(each for each in METRICS if "conduct" in each.whose)
+METRICS_OF_GAMES = tuple(each for each in METRICS if not {"ego", "person", "conduct"} & {*each.whose})
+assert conduct  # used for what its import enters
+assert measures
+
+
+def conduct_of(game: RecordedGame) -> list[dict[str, Any]]:
+    """The rows of `conduct.csv` of a game: one for each player that took part."""
+    return [
+        {
+            "player": role,
+            "outcome": drive.outcome.word,
+            **{each.column.name: each.of(drive) for each in METRICS_OF_CONDUCT},
+        }
+        for role, drive in _drives(game).items()
+    ]
 
 
 def measured(game: RecordedGame) -> dict[str, Any]:
     """The cells of a game that its trace tells, None where one can't be measured."""
-    drives = {
-        role: Drive(game=game, player=player)
-        for player, role in enumerate(game.world.roles)
-        if game.last_step(player) is not None
-    }
+    drives = _drives(game)
     cells: dict[str, Any] = {"duration_s": (len(game.drove) - 1) * game.world.step_s}
     for player, role in enumerate(game.world.roles):
         cells[f"{role}_outcome"] = game.outcomes[player].word
@@ -37,6 +48,15 @@ def measured(game: RecordedGame) -> dict[str, Any]:
         drive = judged if "judged" in each.whose else ego
         cells[each.column.name] = each.of(drive) if drive is not None else None
     return cells
+
+
+def _drives(game: RecordedGame) -> dict[str, Drive]:
+    """Of the players that took part, by name."""
+    return {
+        role: Drive(game=game, player=player)
+        for player, role in enumerate(game.world.roles)
+        if game.last_step(player) is not None
+    }
 
 
 def collided_with(game: RecordedGame) -> str:

@@ -66,7 +66,8 @@ class Metric:
     column: Column
     """Of the game; a player's has the player's name before this name."""
     whose: tuple[str, ...]
-    """`ego`, `person` (each of them), or `game`: the judged player's, without a player's name."""
+    """`ego`, `person` (each of them), `conduct` (each player, in `conduct.csv`), or `game` and `judged`, without a
+    player's name."""
     mean: str
     """The column of `summary.csv` with the ego's mean per arm (that of the people: as in `episodes.csv`); empty:
     none."""
@@ -78,12 +79,12 @@ METRICS: list[Metric] = []
 
 
 def metric(
-    *whose: str, meaning: str, dtype: str = NUMBER, source: str = "", mean: str = ""
+    *whose: str, meaning: str, dtype: str = NUMBER, source: str = "", mean: str = "", unit: str = ""
 ) -> Callable[[Callable[[Any], Value]], Callable[[Any], Value]]:
     """Enter a function of a `Drive` into `METRICS`: its name is that of the column."""
 
     def enter(function: Callable[[Any], Value]) -> Callable[[Any], Value]:
-        column = Column(function.__name__, dtype, meaning, source=source)
+        column = Column(function.__name__, dtype, meaning, source=source, unit=unit)
         METRICS.append(Metric(column=column, whose=whose, mean=mean, of=function))
         return function
 
@@ -122,13 +123,14 @@ def min_ttc_s(drive: Drive) -> float | None:
     return finite(drive.of("time_to_collision_s"), np.min)
 
 
-@metric("ego", meaning="Strongest braking; 0 if the ego never braked.", mean="max_deceleration_mps2")
+@metric("ego", "conduct", meaning="Strongest braking; 0 without any.", mean="max_deceleration_mps2")
 def max_deceleration_mps2(drive: Drive) -> float | None:
     return finite(np.maximum(-drive.acceleration_mps2, 0.0), np.max)
 
 
 @metric(
     "ego",
+    "conduct",
     meaning="Greatest lateral acceleration, to either side; empty where SUMO drives.",
     mean="max_lateral_acceleration_mps2",
 )
@@ -147,7 +149,7 @@ def red_lights(drive: Drive) -> float:
     return float(np.count_nonzero(drive.of("passed_red_s") >= 0.0))
 
 
-@metric("person", meaning="Longest time since the onset of red at which the person passed a stop line.")
+@metric("person", "conduct", meaning="Longest time since the onset of red at which the player passed a stop line.")
 def latest_red_s(drive: Drive) -> float | None:
     passed_red_s = drive.of("passed_red_s")
     return finite(passed_red_s[passed_red_s >= 0.0], np.max)
@@ -178,8 +180,9 @@ def pet_priority(drive: Drive) -> str | None:
 
 @metric(
     "ego",
-    meaning="Least gap that the ego accepted: the time that a road user with priority would have needed to the zone of "
-    "conflict at constant speed when the ego entered it; 0 if it was inside.",
+    "conduct",
+    meaning="Least gap that the player accepted: the time that a road user with priority would have needed to the zone "
+    "of conflict at constant speed when the player entered it; 0 if it was inside.",
 )
 def accepted_gap_s(drive: Drive) -> float | None:
     return finite(np.array([each.gap_s for each in drive.encounters if each.must_yield]), np.min)

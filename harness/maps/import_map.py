@@ -25,7 +25,7 @@ from harness.road.xml.xml_file import xml_bytes
 
 _PATIENCE_S = 900.0
 _LAYER_M = 6.0  # of height between a road and the one that it passes over
-_RING_M = 6.0  # of a roundabout of one lane: 16 to 20 ft (NCHRP Report 672, 2010, 6.4.3)
+_RING_M = 6.0  # of a roundabout of one lane. Our own: from 6 to 7 m most entries can be driven, at 5.5 m fewer
 _WAY = re.compile(rb"""<way\b(?:[^>"']|"[^"]*"|'[^']*')*?\sid=["']([^"']*)["'](?:[^>"']|"[^"]*"|'[^']*')*>""")
 _NO_ROAD = ("has no road that cars may use and that meets another", "export an area with junctions of roads for cars")
 _CUT = "cut out a part: netconvert -s FILE --keep-edges.in-boundary XMIN,YMIN,XMAX,YMAX -o part.net.xml"

@@ -7,6 +7,7 @@ from typing import Any
 
 from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.unplayed_games import reasons_of
+from harness.reports import human_ranges
 from harness.reports.acceptance_wording import acceptance_lines, headline
 from harness.reports.arm_figures import MOST_DOTS
 from harness.reports.arm_glossary import glossary
@@ -80,6 +81,9 @@ def render_page(tables: RunTables, games: Iterable[GameTracks] = (), scene: Mapp
         glossary=glossary(tables),
         versions=tables.manifest.get("versions", {}),
         game=game_section(tables.game, links),
+        human_rows=human_ranges.human_rows(tables.realism),
+        human_headline=human_ranges.headline(tables.realism),
+        human_plots=human_ranges.plots(tables.realism),
         content_policy=CONTENT_POLICY,
         elsewhere=ELSEWHERE.format("[]"),
         libraries=sources(environment, LIBRARIES),

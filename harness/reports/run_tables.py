@@ -72,6 +72,7 @@ class RunTables:
     """Empty: the report has no section on searches."""
     populations: pd.DataFrame = field(default_factory=_empty("populations"))
     causes: pd.DataFrame = field(default_factory=_empty("causes"))
+    realism: pd.DataFrame = field(default_factory=_empty("realism"))
     reference_drivers: pd.DataFrame = field(default_factory=_empty("reference_drivers"))
     preventability: pd.DataFrame = field(default_factory=_empty("preventability"))
     """Empty: no failure was judged by reference drivers."""

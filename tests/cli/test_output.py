@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import shutil
 from pathlib import Path
@@ -13,6 +14,7 @@ import pytest
 from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.run_log import LOG
 from harness.evaluation.tables import read_csv
+from harness.reports.human_ranges import comparable, headline
 from tests.support.tiny import BY_SUMO, MERGE, harness, sumo_run, write_campaign
 
 LINE = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ (DEBUG|INFO|WARNING|ERROR) +\S.*|    .*")
@@ -39,6 +41,20 @@ def test_check__json_has_the_stages(tmp_path: Path) -> None:
     assert stages["naive_vs_speedy-seed1"]["after"] == ["speedy-seed1"]
     assert {each["kind"] for each in checked["stages"]} == {"training", "assessment"}
     assert as_json("check", MERGE)["scene"] == str(MERGE)
+
+
+def test_realism__prints_its_table_and_json_has_every_row(run: Path) -> None:
+    table = read_csv(run / "realism.csv")
+    said = harness("realism", run)
+    assert said.returncode == 0, said.stderr
+    assert headline(table) in said.stdout
+    assert f"Not comparable: {len(table) - len(comparable(table))} more figures" in said.stdout
+    assert [(row["player"], row["figure"], row["value"]) for row in as_json("realism", run)] == [
+        (row["player"], row["figure"], None if math.isnan(row["value"]) else pytest.approx(row["value"]))
+        for row in table.to_dict("records")
+    ]
+    (run / "realism.csv").write_text("player\n")
+    assert harness("realism", run).returncode == 2
 
 
 def test_check__json_has_the_problems(tmp_path: Path) -> None:

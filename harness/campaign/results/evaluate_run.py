@@ -23,7 +23,8 @@ from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.competence import Goals, Question, goals_alone
 from harness.evaluation.game_theory.findings import GameFindings, find
 from harness.evaluation.people import people_in
-from harness.evaluation.strategies import NaiveEgo, ReconfiguredEgo, RetrainedEgo, against_persona
+from harness.evaluation.realism import realism
+from harness.evaluation.strategies import Arm, NaiveEgo, ReconfiguredEgo, RetrainedEgo, against_persona
 from harness.evaluation.tables import joined, table_of
 from harness.game.initial_state import member_in_episode
 from harness.game.roles import NON_EGO
@@ -42,7 +43,7 @@ def evaluated(run: ReadRun) -> RunTables:
         prevented = {"reference_drivers": run.reference_drivers, "preventability": counts}
     tables = RunTables(
         manifest=manifest,
-        arms={stage.name: stage.arm for stage in run.stages if isinstance(stage, AssessmentStage)},
+        arms=_arms(run),
         strategies={stage.name: stage.strategy for stage in run.stages if isinstance(stage, TrainingStage)},
         episodes=run.episodes,
         summary=summarise(run.episodes),
@@ -51,8 +52,9 @@ def evaluated(run: ReadRun) -> RunTables:
         reconfiguration=run.reconfiguration,
         manoeuvres=run.manoeuvres,
         causes=run.causes,
+        realism=realism(run.conduct, _arms(run), people_drive=_people_drive(run)),
         game=_game(run),
-        non_ego_drives=all(each.drives for each in run.scene.document.players[1:]),
+        non_ego_drives=_people_drive(run),
         populations=by_who_drove(run.campaign, run.episodes),
         **prevented,
     )
@@ -73,12 +75,20 @@ def evaluated(run: ReadRun) -> RunTables:
 
 def csv_tables(run: ReadRun, tables: RunTables) -> dict[str, pd.DataFrame]:
     """The tables that the run folder gets, by the names of their files."""
-    names = ["episodes", "training", "summary", "comparisons", "causes", "manoeuvres"]
+    names = ["episodes", "training", "summary", "comparisons", "causes", "manoeuvres", "realism"]
     names += ["reference_drivers", "preventability"] if run.reference_drivers is not None else []
     names += ["populations"] if run.campaign.population else []
     names += ["reconfiguration"] if is_tuned(run.manifest) else []
-    found = {name: getattr(tables, name) for name in names}
+    found = {"conduct": run.conduct} | {name: getattr(tables, name) for name in names}
     return found | (tables.game.tables if tables.game is not None else {})
+
+
+def _arms(run: ReadRun) -> dict[str, Arm]:
+    return {stage.name: stage.arm for stage in run.stages if isinstance(stage, AssessmentStage)}
+
+
+def _people_drive(run: ReadRun) -> bool:
+    return all(each.drives for each in run.scene.document.players[1:])
 
 
 def _goals(run: ReadRun) -> dict[str, Goals]:

@@ -49,6 +49,7 @@ class ReadRun:
     episodes: pd.DataFrame
     causes: pd.DataFrame
     manoeuvres: pd.DataFrame
+    conduct: pd.DataFrame
     training: pd.DataFrame
     reconfiguration: pd.DataFrame
     reference_drivers: pd.DataFrame | None
@@ -79,17 +80,23 @@ def read_run(folder: RunFolder, console: Console) -> ReadRun:
         episodes=joined("episodes", [arm.episodes for arm in arms]),
         causes=joined("causes", [arm.causes for arm in arms]),
         manoeuvres=joined("manoeuvres", [arm.manoeuvres for arm in arms]),
+        conduct=joined("conduct", [arm.conduct for arm in arms]),
         training=training,
         reconfiguration=searches,
         reference_drivers=joined("reference_drivers", judged) if judged else None,
     )
 
 
+def result_table(folder: RunFolder, name: str) -> pd.DataFrame:
+    """A table of the results that a run wrote. Raises UsageError for a folder that is no run, and one without it."""
+    folder.manifest()
+    return read_csv(folder.result(f"{name}.csv"))
+
+
 def episodes_of(folder: RunFolder) -> pd.DataFrame:
     """The rows of `episodes.csv`. Raises UsageError unless the folder is one of a run that has games, with the results
     that it wrote."""
-    folder.manifest()
-    episodes = read_csv(folder.result("episodes.csv"))
+    episodes = result_table(folder, "episodes")
     if episodes.empty:
         raise UsageError.of(folder.path, "", "has no games: none of its arms is finished", "run the campaign again")
     return episodes

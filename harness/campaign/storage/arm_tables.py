@@ -1,8 +1,8 @@
-"""What the log of an arm tells, as tables: its games with all metrics, the causes of failures, the manoeuvres.
+"""What the log of an arm tells, as tables: games with all metrics, causes of failures, manoeuvres, conduct of players.
 
 <run>/.stages/<arm>/played.csv         what was stored when the games were played: outcomes, and errors
 <run>/traces/<arm>.parquet             the games
-<run>/.stages/<arm>/episodes.csv       made from these two, as are causes.csv and manoeuvres.csv
+<run>/.stages/<arm>/episodes.csv       made from these two, as are causes.csv, manoeuvres.csv and conduct.csv
 <run>/.stages/<arm>/tables.json        what they were made from: checksums of the log and of the sources that read it
 
 The tables are made again when the log or the sources have changed: a new metric needs no game to be played again.
@@ -22,7 +22,7 @@ from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.versions import digest_of_sources
 from harness.environments.recorded import recorded_game
 from harness.errors import UsageError
-from harness.evaluation.measured_game import measured
+from harness.evaluation.measured_game import conduct_of, measured
 from harness.evaluation.people import people_in
 from harness.evaluation.rule_book.causes import cause_of
 from harness.evaluation.rule_book.course import Course
@@ -40,6 +40,7 @@ class ArmTables:
     episodes: pd.DataFrame
     causes: pd.DataFrame
     manoeuvres: pd.DataFrame
+    conduct: pd.DataFrame
 
 
 def arm_tables(folder: RunFolder, stage: str, scene: OpenScene | None = None) -> ArmTables:
@@ -72,7 +73,7 @@ def _key(folder: RunFolder, stage: str) -> str:
 def _made(folder: RunFolder, stage: str, scene: OpenScene) -> ArmTables:
     played = read_csv(folder.work(stage) / PLAYED)
     games = {int(row["episode"]): row for row in played.to_dict("records")}
-    causes, manoeuvres = list[Mapping[str, Any]](), list[Mapping[str, Any]]()
+    causes, manoeuvres, conduct = (list[Mapping[str, Any]]() for _ in range(3))
     for episode, trace in read_traces(folder.traces(stage)) if not (played["error"] != "").all() else ():
         row = games.get(episode)
         if row is None or row["error"]:
@@ -81,10 +82,12 @@ def _made(folder: RunFolder, stage: str, scene: OpenScene) -> ArmTables:
         course, labels = Course(game=game), {name: row[name] for name in ("arm", "persona", "seed", "episode")}
         games[episode] = {**row, **measured(game)}
         manoeuvres += [labels | each for each in find_manoeuvres(course)]
+        conduct += [labels | each for each in conduct_of(game)]
         if (cause := cause_of(course)) is not None:
             causes.append(labels | {"ego_outcome": row["ego_outcome"]} | cause)
     return ArmTables(
         episodes=table_of("episodes", games.values(), len(people_in(played.columns))),
         causes=table_of("causes", causes),
         manoeuvres=table_of("manoeuvres", manoeuvres),
+        conduct=table_of("conduct", conduct),
     )

@@ -1,0 +1,150 @@
+"""The metrics that say how a player drives: what `realism` compares with published figures of people."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from harness.evaluation.column import SHARE
+from harness.evaluation.metrics import Drive, finite, metric
+from harness.evaluation.rule_book.course import runs
+from harness.evaluation.rule_book.thresholds import LANE_CHANGE_M
+from harness.game.arrays import FloatArray, IntArray
+
+FOLLOWS_S = 3.0
+"""Largest gap over own speed at which a player follows its leader."""
+_FOLLOWS_LEAST_S = 1.0  # of following, in all
+_MOVING_MPS = 5.0
+_BEGUN, _ENDED = 0.05, 0.95  # of the way from lane to lane
+_KEEPS_LEAST_S = 2.0  # of lane keeping, in all
+_WHEEL_RATIO = 15.0  # of a steering wheel's angle to that of the road wheels
+_REVERSAL_RAD = np.radians(3.0) / _WHEEL_RATIO
+
+
+class LaneChange(NamedTuple):
+    """A change from lane to lane: the last step on the centre of the old lane, and the first on that of the new one."""
+
+    first: int
+    last: int
+
+
+class _Lanes(NamedTuple):
+    """[N] the nearest lane of the route in each step, its centre and the player, both from the route's line."""
+
+    lane: IntArray
+    centre_m: FloatArray
+    place_m: FloatArray
+
+
+def _lanes(drive: Drive) -> _Lanes:
+    routes, place_m = drive.game.quantities.world.road.routes, drive.of("lateral_offset_m")
+    rows = drive.game.while_driving(routes.rows(drive.game.quantities.state.station_m), drive.player)
+    away_m = np.abs(routes.lane_offset_m[rows] - place_m[:, None])
+    lane = np.where(np.isnan(away_m), np.inf, away_m).argmin(1)
+    return _Lanes(lane, routes.lane_offset_m[rows, lane], place_m)
+
+
+def lane_changes(drive: Drive) -> list[LaneChange]:
+    """The changes of lane that a player began and ended while it drove. The first 5 % and the last 5 % of the way are
+    those of keeping a lane."""
+    found, (_, centre_m, place_m) = list[LaneChange](), _lanes(drive)
+    for step in np.flatnonzero(np.abs(np.diff(centre_m)) > LANE_CHANGE_M).tolist():
+        old_m, new_m = centre_m[step], centre_m[step + 1]
+        share = (place_m - old_m) / (new_m - old_m)
+        before, behind = np.flatnonzero(share[: step + 1] <= _BEGUN), np.flatnonzero(share[step + 1 :] >= _ENDED)
+        if len(before) and len(behind):
+            found.append(LaneChange(int(before[-1]), step + 1 + int(behind[0])))
+    return found
+
+
+@metric("conduct", meaning="Distance along the route.")
+def distance_m(drive: Drive) -> float:
+    return float(drive.of("advanced_m").sum())
+
+
+@metric(
+    "conduct",
+    meaning="Mean duration of the changes of lane, from 5 % to 95 % of the way between the centres of the lanes.",
+)
+def lane_change_s(drive: Drive) -> float | None:
+    return finite(np.array([last - first for first, last in lane_changes(drive)]) * drive.step_s, np.mean)
+
+
+@metric(
+    "conduct",
+    meaning="Standard deviation of the distance from the centre of the nearest lane, outside changes of lane.",
+    source="Verster and Roth 2011, SDLP",
+)
+def lateral_wander_m(drive: Drive) -> float | None:
+    _, centre_m, place_m = _lanes(drive)
+    keeps = np.isfinite(centre_m)
+    for change in lane_changes(drive):
+        keeps[change.first : change.last + 1] = False
+    if keeps.sum() * drive.step_s < _KEEPS_LEAST_S:
+        return None
+    return finite((place_m - centre_m)[keeps], np.std)
+
+
+@metric("conduct", meaning=f"Median gap over own speed while following: a leader within {FOLLOWS_S:g} s.")
+def following_gap_s(drive: Drive) -> float | None:
+    follows = (drive.of("time_gap_s") <= FOLLOWS_S) & (drive.of("speed_mps") >= _MOVING_MPS)
+    if follows.sum() * drive.step_s < _FOLLOWS_LEAST_S:
+        return None
+    return finite(drive.of("time_gap_s")[follows], np.median)
+
+
+@metric(
+    "conduct",
+    meaning=f"Mean of speed minus speed limit where no leader is within {FOLLOWS_S:g} s; below 0 under the limit.",
+)
+def free_over_limit_mps(drive: Drive) -> float | None:
+    free = drive.of("time_gap_s") > FOLLOWS_S
+    return finite((drive.of("speed_mps") - drive.of("speed_limit_mps"))[free], np.mean)
+
+
+@metric("conduct", meaning="Greatest change of the acceleration along the heading per second.")
+def max_jerk_mps3(drive: Drive) -> float | None:
+    return finite(np.abs(np.diff(drive.acceleration_mps2)) / drive.step_s, np.max)
+
+
+@metric(
+    "conduct",
+    meaning="Changes of the direction of steering per second, of at least 3 degrees of a steering wheel with a ratio "
+    "of 15; empty where SUMO drives.",
+    source="Markkula and Engström 2006, without its low-pass filter",
+)
+def steering_reversals_per_s(drive: Drive) -> float | None:
+    if not drive.game.steers[drive.player]:
+        return None
+    wheel_rad = drive.game.while_driving(drive.game.quantities.state.steering_rad, drive.player)
+    return len(list(_turning_points(wheel_rad))) / (len(wheel_rad) * drive.step_s) if len(wheel_rad) else None
+
+
+def _turning_points(wheel_rad: FloatArray) -> Iterator[int]:
+    """The steps from which the wheel goes back by at least `_REVERSAL_RAD`."""
+    extreme, sense = 0, 0.0
+    for step, angle in enumerate(wheel_rad.tolist()):
+        way = angle - float(wheel_rad[extreme])
+        if sense * way > 0.0:
+            extreme = step
+        elif abs(way) >= _REVERSAL_RAD:
+            if sense:
+                yield extreme
+            extreme, sense = step, float(np.sign(way))
+
+
+@metric("conduct", meaning="Share of the time during which the player's attention has lapsed.", unit=SHARE)
+def looks_away_share(drive: Drive) -> float | None:
+    return finite(_lapsed(drive).astype(float), np.mean)
+
+
+@metric("conduct", meaning="Longest lapse of attention; empty without one.")
+def longest_lapse_s(drive: Drive) -> float | None:
+    lengths = [last - first + 1 for first, last in runs(_lapsed(drive).astype(bool))]
+    return max(lengths) * drive.step_s if lengths else None
+
+
+def _lapsed(drive: Drive) -> FloatArray:
+    return drive.game.while_driving(drive.game.quantities.state.lapsed, drive.player)
