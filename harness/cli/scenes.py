@@ -63,8 +63,7 @@ def show_scene(
     folder = folder_of_scene(path)
     scene = open_scene(folder) if folder is not None else None
     net_file = scene.net_file if scene is not None else path
-    if scene is None:
-        check_net(net_file)
+    warnings = scene.warnings if scene is not None else check_net(net_file).warnings
     net = read_net(net_file)
     edges = edges_near(net, net_file, near, within)
     lanes, junctions = [listed_lane(lane) for edge in edges for lane in edge.getLanes()], listed_junctions(edges)
@@ -77,6 +76,7 @@ def show_scene(
     for what, count in (("lanes", len(lanes)), ("conflicts", len(conflicts))):
         if count > rows:
             print_plain([messages.rows_left_out(count - rows, what)], console)
+    print_plain(warnings, console)
     if html is not None:
         from harness.cli.net_views import drawing_of
         from harness.reports.net_page import write_net_page
@@ -223,7 +223,7 @@ def _show(opened: OpenMap, plans: Sequence[GamePlan], console: Console) -> None:
     console.print(plan_table([(plan, opened.place_of(plan)) for plan in plans]), highlight=False)
     counts = Counter(plan.candidate.kind.value for plan in opened.plans)
     print_plain(["in all: " + ", ".join(f"{count} {kind}" for kind, count in counts.items())], console)
-    print_plain([opened.note] if opened.note else [], console)
+    print_plain(opened.notes, console)
     print_plain([f"left out: {count} ({reason})" for reason, count in sorted(opened.left_out.items())], console)
 
 

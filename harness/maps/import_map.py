@@ -49,11 +49,11 @@ _OPENDRIVE_OPTIONS = ("--no-turnarounds", "--geometry.max-grade.fix", "false")
 
 
 class ImportedMap(NamedTuple):
-    """The net of a map, its file, and what the conversion had to leave out, in one line, or empty."""
+    """The net of a map, its file, and what the conversion had to leave out, or SUMO ignores, in a line each."""
 
     net_file: Path
     net: Net
-    note: str = ""
+    notes: tuple[str, ...] = ()
 
 
 def import_map(path: Path, folder: Path, *, left_hand: bool) -> ImportedMap:
@@ -81,7 +81,7 @@ def import_map(path: Path, folder: Path, *, left_hand: bool) -> ImportedMap:
     except UsageError:
         raise UsageError.of(path, "", *_NO_ROAD) from None
     _check_rotation(path, net, is_left)
-    return ImportedMap(file, net, note)
+    return ImportedMap(file, net, (note,) if note else ())
 
 
 def _copied(path: Path, folder: Path, left_hand: bool) -> ImportedMap:
@@ -90,15 +90,16 @@ def _copied(path: Path, folder: Path, left_hand: bool) -> ImportedMap:
     except OSError as error:
         if error.errno == errno.EFBIG:
             raise UsageError.of(path, "", str(error.strerror), _CUT) from None
-    _check_own_net(path, left_hand)
+    warnings = _check_own_net(path, left_hand)
     file = folder / "converted.net.xml"
     file.write_bytes(xml_bytes(path))
-    return ImportedMap(file, read_net(path))
+    return ImportedMap(file, read_net(path), warnings)
 
 
-def _check_own_net(path: Path, left_hand: bool) -> None:
-    """Raise UsageError for a net that is invalid, without right of way, or with traffic on the other side."""
-    root = check_net(path)
+def _check_own_net(path: Path, left_hand: bool) -> tuple[str, ...]:
+    """The warnings of a net. Raises UsageError for one that is invalid, without right of way, or with traffic on the
+    other side."""
+    root, warnings = check_net(path)
     says_left = root.get("lefthand") in ("true", "1")
     if left_hand and not says_left:
         message = "is a net with right-hand traffic"
@@ -106,6 +107,7 @@ def _check_own_net(path: Path, left_hand: bool) -> None:
     if not root.findall("junction/request") and len(root.findall("connection")) > 1:
         message = "has no right of way: its junctions have no element request"
         raise UsageError.of(path, "junction", message, "build it again with netconvert or netedit")
+    return warnings
 
 
 def _convert(path: Path, kind: MapKind, *, facts: MapFacts, net_file: Path, left_hand: bool) -> str:

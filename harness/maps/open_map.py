@@ -36,7 +36,7 @@ class OpenMap:
     net_file: Path
     plans: Sequence[GamePlan]
     left_out: dict[str, int]  # reason and number of conflicts of which no scene can be made
-    note: str  # what the conversion had to leave out; empty if nothing
+    notes: tuple[str, ...]  # what the conversion had to leave out, and what SUMO ignores
     net: Net = field(repr=False)
     whole_net: bool = False  # scenes get all of the net
     traffic: RouteFile | None = field(default=None, repr=False)
@@ -86,7 +86,7 @@ def open_map(
 
     Raises UsageError for a map on which no game can be made, and for a route file that does not fit it.
     """
-    net_file, net, note = import_map(source, folder, left_hand=left_hand)
+    net_file, net, notes = import_map(source, folder, left_hand=left_hand)
     traffic = None if routes is None else read_traffic(routes, net_file, net, is_cut=not whole_net)
     plans = Plans(net, show)
     if not plans.all:
@@ -99,7 +99,7 @@ def open_map(
         net=net,
         plans=plans.all,
         left_out=plans.left_out,
-        note=note,
+        notes=notes if traffic is None else (*notes, *traffic.warnings),
         whole_net=whole_net,
         traffic=traffic,
     )

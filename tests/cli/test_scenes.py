@@ -59,6 +59,23 @@ def test_show__of_a_compressed_net(tmp_path: Path, lines_of: Run) -> None:
     assert lines_of("scene", "show", packed) == lines_of("scene", "show", net_file(MERGE))
 
 
+def test_scene__an_attribute_that_sumo_ignores_is_a_warning_of_each_command(tmp_path: Path, lines_of: Run) -> None:
+    folder = shutil.copytree(MERGE, tmp_path / "merge")
+    net, routes = folder / "merge.net.xml", folder / "merge.rou.xml"
+    net.write_text(net.read_text().replace("<junction ", '<junction kind="x" '))
+    routes.write_text(routes.read_text().replace("<vehicle ", '<vehicle departSpd="3" '))
+    about_net = [line for line in lines_of("scene", "show", net) if line.startswith("warning: ")]
+    assert [line.split(" (")[0] for line in about_net] == [
+        f"warning: {net}: junction finish: SUMO ignores the attribute 'kind', 3 times"
+    ]
+    slip = "SUMO ignores the attribute 'departSpd', 2 times (did you mean 'departSpeed'?)"
+    both = [*about_net, f"warning: {routes}: vehicle ego: {slip}"]
+    for command in (("scene", "show"), ("check",)):
+        assert [line for line in lines_of(*command, folder) if line.startswith("warning: ")] == both
+    new = lines_of("scene", "new", "a", "--from", net, "--list")
+    assert [line for line in new if line.startswith("warning: ")] == about_net
+
+
 def test_show__says_how_many_lanes_are_left_out(generate_net: Callable[..., Path], lines_of: Run) -> None:
     net = generate_net("--grid", "--grid.number", "3")
     lines = lines_of("scene", "show", net, "--rows", "5")

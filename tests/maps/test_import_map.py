@@ -168,7 +168,7 @@ def test_import__a_crash_of_netconvert_leaves_out_the_option_that_it_comes_from(
     tmp_path: Path, crashing: Callable[[str], None]
 ) -> None:
     crashing("--osm.crossings")
-    _, net, note = import_map(TOWN, tmp_path, left_hand=False)
+    _, net, (note,) = import_map(TOWN, tmp_path, left_hand=False)
     assert note == "netconvert ended by signal SIGSEGV with --osm.crossings; converted without pedestrian crossings"
     assert not any(edge.getFunction() == "crossing" for edge in net.getEdges())
     lanes = [lane for edge in net.getEdges() for lane in edge.getLanes()]

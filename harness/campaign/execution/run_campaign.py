@@ -49,8 +49,9 @@ def run_campaign(
     with folder.held():
         with console.status(REPEATING):
             varying = varying_drivers(campaign, folder)
-        for driver, difference in (*varying.items(), *campaign.learned_elsewhere.items()):
-            console.print(plain(f"{driver}: {difference}"), style="bold yellow", highlight=False, markup=False)
+        differences = (*varying.items(), *campaign.learned_elsewhere.items())
+        for line in (*campaign.scene.warnings, *(plain(f"{driver}: {words}") for driver, words in differences)):
+            console.print(line, style="bold yellow", highlight=False, markup=False)
         stages = plan(campaign.document, [persona.name for persona in campaign.personas], campaign.tunable)
         keys = stage_keys(campaign, stages)
         with console.status(CHECKING):

@@ -158,6 +158,8 @@ class RouteFile:
     mixes: Mapping[str, Mix] = field(default_factory=dict)
     found: Mapping[tuple[str, tuple[str, ...]], tuple[str, ...]] = field(default_factory=dict)
     """The routes of trips: the edges for each vehicle type and trip."""
+    warnings: tuple[str, ...] = ()
+    """A line for each attribute that SUMO ignores."""
 
     def departures(
         self,

@@ -49,9 +49,10 @@ _FASTEST_WALK_MPS = 12.5
 
 def read_route_file(path: Path, *additional: Path) -> RouteFile:
     """Read a `.rou.xml`, with the content of additional files. Raises UsageError for invalid or unsupported content."""
-    root = _content(path)
-    for each in additional:
-        root.extend(_content(each))
+    contents = [_content(each) for each in (path, *additional)]
+    root = contents[0][0]
+    for more, _ in contents[1:]:
+        root.extend(more)
     only_types = ElementTree.Element("routes")
     only_types.extend(element for element in root if element.tag in ("vType", "vTypeDistribution"))
     problems: list[Problem] = []
@@ -85,13 +86,13 @@ def read_route_file(path: Path, *additional: Path) -> RouteFile:
         vehicles=vehicles,
         flows=tuple(flows.values()),
         types_xml=ElementTree.tostring(only_types, encoding="unicode"),
+        warnings=tuple(line for _, warnings in contents for line in warnings),
     )
 
 
-def _content(path: Path) -> ElementTree.Element:
+def _content(path: Path) -> tuple[ElementTree.Element, tuple[str, ...]]:
     root = parse_xml(path)
-    check_content(path, root)
-    return root
+    return root, check_content(path, root)
 
 
 def _travellers(root: ElementTree.Element) -> list[ElementTree.Element]:

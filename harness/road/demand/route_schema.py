@@ -13,7 +13,8 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from harness.errors import Problem, UsageError
-from harness.road.xml.element_kinds import ElementKind, problems_in
+from harness.road.xml.element_kinds import drop_ignored, problems_in
+from harness.road.xml.sumo_schema import attributes_of
 
 VEHICLES = ("vehicle", "trip", "flow")
 PEOPLE = ("person", "personFlow")
@@ -26,50 +27,28 @@ _RECORDERS = r"(battery|elechybrid|emissions|fcd|tripinfo|vehroute)"
 _RECORDED_ONLY = re.compile(rf"has\.{_RECORDERS}\.device|device\.{_RECORDERS}\..*")
 
 
-def _kind(children: str, *attributes: str) -> ElementKind:
-    return ElementKind(children.split(), " ".join(attributes).split())
-
-
-_VEHICLE = (
-    "id type departLane departPos departSpeed departPosLat departEdge",
-    "arrivalLane arrivalPos arrivalSpeed arrivalEdge speedFactor reroute insertionChecks",
-    "color line personNumber containerNumber parkingBadges arrivalPosLat fromTaz toTaz",  # without effect
-)
-_PERSON = "id type departPos arrivalPos color arrival speedFactor"
-_FLOW = "begin end number period perHour probability"
 _INSIDE = "route routeDistribution stop param"
-_KINDS = {
+_CHILDREN = {
     **dict.fromkeys(
-        _ROOTS,
-        _kind(" ".join((*VEHICLES, *PEOPLE, "vType vTypeDistribution route routeDistribution interval busStop"))),
+        _ROOTS, " ".join((*VEHICLES, *PEOPLE, "vType vTypeDistribution route routeDistribution interval busStop"))
     ),
-    "vType": ElementKind(),  # SUMO checks its attributes
-    "vTypeDistribution": _kind("vType", "id vTypes probabilities"),
-    "route": _kind("stop param", "id refId edges repeat cycleTime color cost savings probability routeLength"),
-    "routeDistribution": _kind("route", "id last routes probabilities"),
-    "vehicle": _kind(_INSIDE, *_VEHICLE, "depart route arrival routeLength"),
-    "trip": _kind("stop param", *_VEHICLE, "depart from to via"),
-    "flow": _kind(_INSIDE, *_VEHICLE, "route from to via vehsPerHour", _FLOW),
-    "interval": _kind("flow", "id begin end"),
-    "stop": _kind(
-        "param",
-        "lane edge busStop startPos endPos friendlyPos duration until parking",
-        "arrival actType tripId line started ended actualArrival depart priority",  # without effect
-    ),
-    "busStop": _kind(
-        "param access",
-        "id lane startPos endPos",
-        "name lines personCapacity parkingLength color angle friendlyPos",  # without effect
-    ),
-    "access": _kind("", "lane pos length friendlyPos"),
-    "person": _kind("walk param", _PERSON, "depart"),
-    "personFlow": _kind("walk param", _PERSON, "personsPerHour", _FLOW),
-    "walk": _kind(
-        "param",
-        "edges route from to departPos arrivalPos speed",
-        "cost routeLength exitTimes started ended waitingTime",  # without effect
-    ),
+    "vType": "param",
+    "vTypeDistribution": "vType",
+    "route": "stop param",
+    "routeDistribution": "route",
+    "vehicle": _INSIDE,
+    "trip": "stop param",
+    "flow": _INSIDE,
+    "interval": "flow",
+    "stop": "param",
+    "busStop": "param access",
+    "access": "",
+    "person": "walk param",
+    "personFlow": "walk param",
+    "walk": "param",
 }
+KINDS = {tag: tuple(children.split()) for tag, children in _CHILDREN.items()}
+"""The tags of the children of each element. Its attributes are those of SUMO, but for those that are refused."""
 
 
 def _each_of(tags: str, names: str, message: str, remedy: str) -> dict[str, tuple[str, str]]:
@@ -97,10 +76,17 @@ _REFUSED: Mapping[str, tuple[str, str]] = {
         "nothing arrives that the stop could wait for",
         "give a duration instead",
     ),
-    **_each_of("stop", "speed jump jumpUntil extension", "is not supported", "leave it out"),
+    **_each_of(
+        "stop",
+        "speed jump jumpUntil extension posLat index onDemand permitted collision priorEdges priorEdgesLength",
+        "is not supported",
+        "leave it out",
+    ),
+    **_each_of("vTypeDistribution", "deterministic", "is not supported", "leave it out"),
+    **_each_of("vehicle", "via", "is not supported", "give a route, or write a trip"),
     **_each_of(
         "person personFlow",
-        "ride stop personTrip transport tranship access",
+        "ride stop personTrip transport tranship access modes vTypes",
         "is not supported: no vehicle takes persons along, and nothing comes that they wait for",
         "remove it",
     ),
@@ -116,20 +102,24 @@ _REFUSED: Mapping[str, tuple[str, str]] = {
 }
 """Message and remedy of refused elements, and of attributes and children after the tag of their element."""
 _ONLY = {"reroute": ("false", "0"), "insertionChecks": ("all",)}  # the values of attributes that have no other
+_CHECKED = {f"{tag}.{name}" for tag in VEHICLES for name in _ONLY}
 
 
-def check_content(path: Path, root: ElementTree.Element) -> None:
-    """Raise UsageError for unsupported elements and attributes, and for names that SUMO does not allow.
+def check_content(path: Path, root: ElementTree.Element) -> tuple[str, ...]:
+    """Remove from the tree what only draws or records, and the attributes that SUMO ignores, with a line of warning for
+    each of these.
 
-    Removes from the tree what only draws or records.
+    Raises UsageError for unsupported elements and attributes, and for names that SUMO does not allow.
     """
     if root.tag not in _ROOTS:
         message = "is not a SUMO route file: its root is not routes"
         raise UsageError.of(path, str(root.tag), message, "name a .rou.xml")
     _remove_records(root)
-    problems = [*_refused(path, root), *_invalid_names(path, root), *problems_in(path, root, _KINDS, _REFUSED)]
+    problems = [*_refused(path, root), *_invalid_names(path, root), *problems_in(path, root, KINDS, _REFUSED)]
     if problems:
         raise UsageError(problems)
+    attributes = {**attributes_of("additional_file"), **attributes_of("routes_file")}
+    return drop_ignored(path, root, attributes, _CHECKED)
 
 
 def _remove_records(root: ElementTree.Element) -> None:

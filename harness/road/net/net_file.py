@@ -10,6 +10,7 @@ from collections.abc import Collection, Iterator, Sequence
 from graphlib import CycleError, TopologicalSorter
 from itertools import chain, islice
 from pathlib import Path
+from typing import NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -17,7 +18,8 @@ import numpy as np
 from harness.config.toml_reading import nearest
 from harness.errors import Problem, UsageError
 from harness.game.arrays import FloatArray
-from harness.road.xml.element_kinds import ElementKind, problems_in
+from harness.road.xml.element_kinds import drop_ignored, problems_in
+from harness.road.xml.sumo_schema import attributes_of
 from harness.road.xml.xml_file import number_of, parse_xml
 
 _REMEDY = "build it with netconvert or netedit"
@@ -56,16 +58,24 @@ _CHILDREN = {
     "junction": "request",
     "connection": "conflict",
 }
-_KINDS = {tag: ElementKind((*children.split(), "param")) for tag, children in _CHILDREN.items()}
+_KINDS = {tag: (*children.split(), "param") for tag, children in _CHILDREN.items()}
 """The elements of a net that SUMO and the harness read. All others have params only."""
 
 
-def check_net(path: Path) -> ElementTree.Element:
-    """The root of a net. Raises UsageError, with file and element, for an invalid net, or one that makes SUMO use other
+class CheckedNet(NamedTuple):
+    """The root of a net without the attributes that SUMO ignores, and a warning of these, in a line each."""
+
+    root: ElementTree.Element
+    warnings: tuple[str, ...]
+
+
+def check_net(path: Path) -> CheckedNet:
+    """Read a net. Raises UsageError, with file and element, for an invalid net, or one that makes SUMO use other
     files."""
     root = parse_xml(path)
     if root.tag != "net":
         raise UsageError.of(path, str(root.tag), "is not a SUMO net: its root is not net", _REMEDY)
+    warnings = drop_ignored(path, root, attributes_of("net_file"))
     if unknown := problems_in(path, root, _KINDS):
         raise UsageError(unknown)
     faults = chain(_attribute_faults(root), _number_faults(root), _reference_faults(root), _signal_faults(root))
@@ -74,7 +84,7 @@ def check_net(path: Path) -> ElementTree.Element:
         raise UsageError(problems)
     if too_large := _too_large(root):
         raise UsageError.of(path, "", too_large, "cut out the part that the scene needs")
-    return root
+    return CheckedNet(root, warnings)
 
 
 def _named(element: ElementTree.Element) -> str:

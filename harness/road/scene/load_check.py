@@ -19,6 +19,7 @@ from harness.config.scene import SCENE_FILE
 from harness.errors import Problem, SimulationError, UsageError
 from harness.road.demand.departures import background_departures
 from harness.road.demand.route_writing import traveller_element
+from harness.road.net.net_file import check_net
 from harness.road.scene.open_scene import OpenScene
 from harness.road.xml.sumo_program import run_program
 
@@ -38,6 +39,9 @@ def check_loads(scene: OpenScene) -> None:
         types, vehicles = folder / "types.rou.xml", folder / "vehicles.rou.xml"
         types.write_text(scene.routes.types_xml, encoding="utf-8")
         end_s = _write_vehicles(scene, vehicles)
+        if scene.net_warnings:  # the schema has no attributes but those that SUMO reads
+            ElementTree.ElementTree(check_net(net).root).write(folder / "checked.net.xml")
+            net = folder / "checked.net.xml"
         options = [
             *("--net-file", str(net), "--route-files", f"{types},{vehicles}", "--end", str(end_s)),
             *("--step-length", "1", "--collision.action", "none", "--time-to-teleport", "-1"),
@@ -48,7 +52,7 @@ def check_loads(scene: OpenScene) -> None:
     complaint = f"SUMO did not finish reading it within {patience_s:.0f} s" if run is None else _complaint(run)
     if complaint:
         about_net = not (str(types) in complaint or str(vehicles) in complaint or _ABOUT_VEHICLES.search(complaint))
-        raise UsageError([_problem(complaint, net if about_net else routes, about_net)])
+        raise UsageError([_problem(complaint, scene.net_file.resolve() if about_net else routes, about_net)])
     if scene.document.warm_up_s and scene.has_background_traffic:
         try:
             _ = scene.warm_up
@@ -82,7 +86,7 @@ def _complaint(run: subprocess.CompletedProcess[str]) -> str:
 
 def _problem(complaint: str, file: Path, about_net: bool) -> Problem:
     place = _PLACE.search(complaint)
-    key = f"line {place[1]}, column {place[2]}" if place and about_net else ""
+    key = f"line {place[1]}, column {place[2]}" if place and str(file) in complaint else ""
     lines = [line.strip().removeprefix("Error: ") for line in complaint.splitlines()]
     message = "; ".join(dict.fromkeys(line for line in lines if line and not line.startswith(("In file", "At line"))))
     remedy = "build it with netconvert or netedit" if about_net else "correct it as SUMO's message says"

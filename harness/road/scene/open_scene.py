@@ -43,6 +43,7 @@ class OpenScene:
     folder: Path
     document: Scene
     world: World
+    net_warnings: tuple[str, ...]  # a line for each attribute of the net that SUMO ignores
     routes: RouteFile
     places: tuple[StartRange, ...]
     edges: tuple[tuple[str, ...], ...]  # each player's route, from its start edge on
@@ -100,8 +101,9 @@ class OpenScene:
 
     @property
     def warnings(self) -> list[str]:
-        """What is no mistake but makes games void: a sentence for each two players who may start in one another."""
-        return start_warnings(self.usual_starts, self.world)
+        """What is no mistake but may be a slip: a line for each attribute that SUMO ignores, and for each two players
+        who may start in one another."""
+        return [*self.net_warnings, *self.routes.warnings, *start_warnings(self.usual_starts, self.world)]
 
     def start_distribution(
         self,
@@ -159,6 +161,7 @@ def open_scene(folder: str | Path, ego_type: str | None = None) -> OpenScene:
         folder=files.folder,
         document=document,
         world=world_of(files, players, rail_lines=rail_lines, ground=ground, obstacles=obstacles),
+        net_warnings=files.net_warnings,
         routes=with_types(files.routes, obstacles),
         obstacles=obstacles,
         lane_strips=strips_near(net, used, obstacles),

@@ -29,6 +29,8 @@ class SceneFiles:
     folder: Path
     document: Scene
     net: Net
+    net_warnings: tuple[str, ...]
+    """A line for each attribute of the net that SUMO ignores."""
     routes: RouteFile
 
     @property
@@ -59,7 +61,8 @@ def read_scene(folder: Path, ego_type: str | None) -> SceneFiles:
     if named is None:
         raise UsageError(problems)
     net_file, route_files = folder / named.net, [folder / each for each in (named.routes, *named.additional)]
-    net = collect(problems, lambda: _net(net_file, folder))
+    read_net = collect(problems, lambda: _net(net_file, folder))
+    net, net_warnings = read_net or (None, ())
     routes = collect(problems, lambda: _routes(route_files, folder, document, ego_type))
     if (
         document is not None and net is not None and routes is None
@@ -75,13 +78,13 @@ def read_scene(folder: Path, ego_type: str | None) -> SceneFiles:
     routed = collect(problems, partial(with_routes, routes, net_file, net, needed))
     if routed is None or problems:
         raise UsageError(problems)
-    return SceneFiles(folder=folder, document=document, net=net, routes=routed)
+    return SceneFiles(folder=folder, document=document, net=net, net_warnings=net_warnings, routes=routed)
 
 
-def _net(path: Path, folder: Path) -> Net:
+def _net(path: Path, folder: Path) -> tuple[Net, tuple[str, ...]]:
     _check_within(path, folder)
-    check_net(path)
-    return network.read_net(path)
+    warnings = check_net(path).warnings
+    return network.read_net(path), warnings
 
 
 def _routes(paths: Sequence[Path], folder: Path, document: Scene | None, ego_type: str | None) -> RouteFile:
