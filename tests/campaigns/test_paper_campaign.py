@@ -56,7 +56,8 @@ def names_in(folder: Path) -> set[str]:
 
 
 def test_campaign__every_file_is_there(run: Path) -> None:
-    tables = ("training.csv", "episodes.csv", "summary.csv", "comparisons.csv", "causes.csv", "manoeuvres.csv")
+    names = ("training", "episodes", "summary", "comparisons", "causes", "manoeuvres", "conduct", "realism")
+    tables = [f"{name}.csv" for name in names]
     folders = ("policies", "traces", "replays", "scene", "tensorboard")
     others = ("manifest.json", "result.json", "junit.xml", "report.html", "harness.log")
     assert {name for name in names_in(run) if not name.startswith(".")} == {*tables, *folders, *others}
