@@ -7,13 +7,14 @@ A worker that crashes affects no other: its stage continues from its last segmen
 crashes in the same segment a training has failed, by name, and the stages that don't need it continue; after as many in
 the same game an arm continues without that game, which is an error.
 
-Where workers are idle and no stage is ready, they help with arms that are running: they play segments of their games,
-for some seconds at a time. A worker that crashes or fails while it helps changes nothing: the arm's own worker plays
-what is missing.
+Where workers are idle and no stage is ready, they help with arms that have been running for some seconds: they play
+segments of their games, for some seconds at a time. A worker that crashes or fails while it helps changes nothing: the
+arm's own worker plays what is missing.
 """
 
 from __future__ import annotations
 
+import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
@@ -26,6 +27,8 @@ from harness.campaign.plan.stages import AssessmentStage, BestOf, Preventability
 
 MOST_CRASHES = 3
 """Crashes of one segment or game after which it is not tried again."""
+HELPED_AFTER_S = 3.0
+"""An arm is helped when it has run for this time: the start of a worker takes as long."""
 MOST_ABANDONED = 20
 """Games of an arm that may be abandoned in one run of the command. With more, the scene is at fault and not a game."""
 
@@ -109,8 +112,11 @@ class Crashes:
 class _Helping:
     """Finds the running arms that idle workers help with."""
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self._clock = clock
         self.running: dict[str, Help] = {}
+        self._since: dict[str, float] = {}
+        """When each arm reported first."""
         self._left: dict[str, int] = {}
         """Games of each running arm that were not played when it last reported."""
         self._closed: set[str] = set()
@@ -121,7 +127,14 @@ class _Helping:
         """Help with the running arm that has most games left for each of its workers; None if no arm has a segment
         left that nobody plays. Which of several best responses an arm plays, its own worker finds out."""
         helped = Counter(each.arm.id for each in self.running.values())
-        arms = [each for each in stages if isinstance(each, AssessmentStage) and each.id not in self._closed]
+        now = self._clock()
+        arms = [
+            each
+            for each in stages
+            if isinstance(each, AssessmentStage)
+            and each.id not in self._closed
+            and now - self._since.get(each.id, now) >= HELPED_AFTER_S
+        ]
         left = {
             arm: self._left.get(arm.id, 0) / (1 + helped[arm.id])
             for arm in arms
@@ -136,6 +149,7 @@ class _Helping:
 
     def note_progress(self, event: Event) -> None:
         """A stage reports what it has done of its own work."""
+        self._since.setdefault(event.stage, self._clock())
         self._left[event.stage] = event.total - event.done
 
     def note(self, event: Event, emit: Emit) -> None:
@@ -149,13 +163,20 @@ class _Helping:
             emit(replace(event, kind="crashed"))
 
 
-def run_stages(stages: Sequence[Stage], finished: Iterable[str], workers: Workers, emit: Emit) -> None:
+def run_stages(
+    stages: Sequence[Stage],
+    finished: Iterable[str],
+    workers: Workers,
+    emit: Emit,
+    *,
+    clock: Callable[[], float] = time.monotonic,
+) -> None:
     """Carry out every stage that is not finished, each after the stages that it needs.
 
     Everything that happens is emitted; nothing is raised for a stage that fails. Raises PlanError where the stages
     can't all be carried out in some order.
     """
-    schedule, crashes, helping = Schedule(stages, finished), Crashes(), _Helping()
+    schedule, crashes, helping = Schedule(stages, finished), Crashes(), _Helping(clock)
     running: dict[str, Stage] = {}
 
     def handle(event: Event) -> None:

@@ -95,6 +95,7 @@ def _end_with_parent(its_input: int) -> None:
 
 
 _END_S = 5.0
+_POLL_S = 1.0
 
 
 def cores() -> int:
@@ -134,9 +135,9 @@ class WorkerPool:
             worker.connection.send((task, attempt))
 
     def next_events(self) -> Sequence[Event]:
-        """Wait for the busy workers: at most one event of each."""
+        """Wait a moment for the busy workers: at most one event of each."""
         busy = [worker for worker in self._workers if worker.task]
-        ready = wait([worker.connection for worker in busy])
+        ready = wait([worker.connection for worker in busy], _POLL_S)
         return [self._event_of(worker) for worker in busy if worker.connection in ready]
 
     def __enter__(self) -> WorkerPool:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import count
 
 import pytest
 
-from harness.campaign.execution.run_stages import MOST_CRASHES, Attempt, run_stages
+from harness.campaign.execution.run_stages import HELPED_AFTER_S, MOST_CRASHES, Attempt, run_stages
 from harness.campaign.execution.stage_run import SEGMENT_EPISODES, Event, Task
 from harness.campaign.plan.stages import AssessmentStage, Stage
 from harness.evaluation.strategies import Arm, NaiveEgo
@@ -94,13 +95,13 @@ def test_run_stages__too_many_crashes_fail_the_stage_and_skip_what_needs_it() ->
 ARM = AssessmentStage(seed=1, persona="", arm=Arm(ego=NaiveEgo()), ego=(), non_ego=())
 
 
-def helped_arm(left: int, *ends: Event) -> tuple[list[str], list[str]]:
-    """An arm that reports how many games are left, in a pool of four; its helpers end as given, then it does. What is
-    emitted, and what is submitted."""
+def helped_arm(left: int, *ends: Event, after_s: float = HELPED_AFTER_S) -> tuple[list[str], list[str]]:
+    """An arm that reports how many games are left, in a pool of four; its helpers end as given, then it does. So much
+    time passes from one look at the clock to the next. What is emitted, and what is submitted."""
     progress = Event(kind="progress", stage=ARM.id, done=100 - left, total=100)
     reports, workers, events = [progress, *ends, Event(kind="done", stage=ARM.id)], Scripted(4), list[Event]()
     workers.next_events = lambda: [reports.pop(0)]  # type: ignore[method-assign]
-    run_stages([ARM], [], workers, events.append)
+    run_stages([ARM], [], workers, events.append, clock=count(0.0, after_s).__next__)
     assert not reports
     return [f"{each.kind} {each.stage}" for each in events if each.kind != "progress"], workers.submitted
 
@@ -116,6 +117,11 @@ def test_idle_workers__help_with_an_arm_by_no_more_than_its_segments() -> None:
     assert submitted == [ARM.id, *(f"{ARM.id}+{number}" for number in (1, 2, 3))]
     assert helped_arm(SEGMENT_EPISODES + 1, nothing[0])[1] == [ARM.id, f"{ARM.id}+1"]
     assert helped_arm(SEGMENT_EPISODES)[1] == [ARM.id]
+
+
+def test_idle_workers__help_with_no_arm_that_has_just_begun() -> None:
+    """The start of a worker would take longer than the arm."""
+    assert helped_arm(100, after_s=0.9 * HELPED_AFTER_S)[1] == [ARM.id]
 
 
 def test_idle_workers__help_again_while_there_are_segments() -> None:
