@@ -32,7 +32,9 @@ class Budget:
     starts: int
     """How often a command is started, after a first time that does not count."""
     seeds: int
-    """Training seeds of the campaign with many arms, of 34 arms each."""
+    """Training seeds of the campaign with many arms."""
+    personas: int
+    """Its personas, with four arms each for every seed, beside two of the naive ego."""
 
 
 FULL = Budget(
@@ -50,6 +52,7 @@ FULL = Budget(
     arms=3,
     starts=9,
     seeds=3,
+    personas=8,
 )
 FAST = Budget(
     lap_s=0.3,
@@ -66,4 +69,5 @@ FAST = Budget(
     arms=1,
     starts=3,
     seeds=1,
+    personas=2,
 )

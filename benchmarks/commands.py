@@ -97,7 +97,7 @@ def _first_line_s(arguments: Sequence[str]) -> float:
 def many_arms_seconds(budget: Budget, on_progress: OnProgress) -> Measured:
     """Seconds to resume a finished campaign of 100 arms, and to write its report; one time each."""
     with tempfile.TemporaryDirectory(prefix="benchmark-") as scratch:
-        file, run = _write_document(Path(scratch), budget.seeds), f"{scratch}/run"
+        file, run = _write_document(Path(scratch), budget), f"{scratch}/run"
         seconds = {}
         for place, (name, arguments) in enumerate(
             {
@@ -113,13 +113,13 @@ def many_arms_seconds(budget: Budget, on_progress: OnProgress) -> Measured:
     return seconds, {"unit": "s", "arms": arms, "episodes": _EPISODES, "first_s": first_s}
 
 
-def _write_document(folder: Path, seeds: int) -> Path:
-    """A campaign with 34 arms of `_EPISODES` games per seed, and trainings of a few seconds."""
-    personas = [persona_file(name).as_posix() for name in ("careful", *_PERSONAS)]
+def _write_document(folder: Path, budget: Budget) -> Path:
+    """A campaign with many arms of `_EPISODES` games, and trainings of a few seconds."""
+    personas = [persona_file(name).as_posix() for name in ("careful", *_PERSONAS[: budget.personas])]
     file = folder / "many-arms.toml"
     file.write_text(
         _MANY_ARMS.format(
-            scene=MERGE.as_posix(), personas=personas[1:], careful=personas[0], seeds=list(range(seeds)),
+            scene=MERGE.as_posix(), personas=personas[1:], careful=personas[0], seeds=list(range(budget.seeds)),
             episodes=_EPISODES,
         ),
         encoding="utf-8",

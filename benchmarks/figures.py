@@ -200,7 +200,7 @@ MEASUREMENTS = (
         keys=("resume_seconds", "report_100_arms_seconds"),
         module="commands",
         function="many_arms_seconds",
-        seconds=lambda budget: 20.0 + 80.0 * budget.seeds,
+        seconds=lambda budget: 20.0 + 10.0 * budget.seeds * budget.personas,
     ),
     Measurement(
         name="arena",
