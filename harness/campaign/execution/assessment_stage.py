@@ -158,7 +158,7 @@ def play_segments(arm: SeatedArm, segments: Sequence[Segment], labels: Mapping[s
             _check_hope(arm, first)
         yield from until_played(segments[len(first) :])
 
-    _play_free(arm, in_order(), labels, run, report)
+    _play_free(arm, in_order(), labels, run, on_game=report)
 
 
 def _check_hope(arm: SeatedArm, first: Sequence[Segment]) -> None:
@@ -174,6 +174,7 @@ def _play_free(
     segments: Iterable[Segment],
     labels: Mapping[str, Any],
     run: StageRun,
+    *,
     on_game: Callable[[int], None] = lambda playing: None,
 ) -> int:
     """Play the segments that no other worker plays or has played. Returns their number.
