@@ -42,7 +42,7 @@ def ranges() -> None:
     for of, figures in (("drivers", OF_DRIVERS), ("people on foot", OF_WALKERS)):
         for each in figures:
             _print_row(title_of(each.name), of, each.games.value, _range(each), each.source or "none found")
-    _print_row(title_of(CRASHES), "all", "alone on the road", "the interval reaches 2.91", CRASH_SOURCE)
+    _print_row(title_of(CRASHES), "all", "alone on the road", "outside if the interval is above 2.91", CRASH_SOURCE)
 
 
 def _print_row(*cells: str) -> None:

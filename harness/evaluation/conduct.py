@@ -11,7 +11,7 @@ from harness.evaluation.column import SHARE
 from harness.evaluation.metrics import Drive, finite, metric
 from harness.evaluation.rule_book.course import runs
 from harness.evaluation.rule_book.thresholds import LANE_CHANGE_M
-from harness.game.arrays import FloatArray, IntArray
+from harness.game.arrays import FloatArray
 
 FOLLOWS_S = 3.0
 """Largest gap over own speed at which a player follows its leader."""
@@ -30,26 +30,19 @@ class LaneChange(NamedTuple):
     last: int
 
 
-class _Lanes(NamedTuple):
-    """[N] the nearest lane of the route in each step, its centre and the player, both from the route's line."""
-
-    lane: IntArray
-    centre_m: FloatArray
-    place_m: FloatArray
-
-
-def _lanes(drive: Drive) -> _Lanes:
+def _in_lane(drive: Drive) -> tuple[FloatArray, FloatArray]:
+    """[N] the centre of the nearest lane in each step, and the place of the player, both from the route's line."""
     routes, place_m = drive.game.quantities.world.road.routes, drive.of("lateral_offset_m")
     rows = drive.game.while_driving(routes.rows(drive.game.quantities.state.station_m), drive.player)
     away_m = np.abs(routes.lane_offset_m[rows] - place_m[:, None])
     lane = np.where(np.isnan(away_m), np.inf, away_m).argmin(1)
-    return _Lanes(lane, routes.lane_offset_m[rows, lane], place_m)
+    return routes.lane_offset_m[rows, lane], place_m
 
 
 def lane_changes(drive: Drive) -> list[LaneChange]:
     """The changes of lane that a player began and ended while it drove. The first 5 % and the last 5 % of the way are
     those of keeping a lane."""
-    found, (_, centre_m, place_m) = list[LaneChange](), _lanes(drive)
+    found, (centre_m, place_m) = list[LaneChange](), _in_lane(drive)
     for step in np.flatnonzero(np.abs(np.diff(centre_m)) > LANE_CHANGE_M).tolist():
         old_m, new_m = centre_m[step], centre_m[step + 1]
         share = (place_m - old_m) / (new_m - old_m)
@@ -78,7 +71,7 @@ def lane_change_s(drive: Drive) -> float | None:
     source="Verster and Roth 2011, SDLP",
 )
 def lateral_wander_m(drive: Drive) -> float | None:
-    _, centre_m, place_m = _lanes(drive)
+    centre_m, place_m = _in_lane(drive)
     keeps = np.isfinite(centre_m)
     for change in lane_changes(drive):
         keeps[change.first : change.last + 1] = False

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
@@ -13,7 +13,6 @@ from scipy.stats import chi2
 
 from harness.evaluation.strategies import (
     Arm,
-    EgoStrategy,
     NaiveEgo,
     PersonaNonEgo,
     RetrainedEgo,
@@ -27,7 +26,7 @@ from harness.game.roles import EGO, NON_EGO, ROLES
 INSIDE, OUTSIDE, NOT_COMPARABLE = "inside", "outside", "not comparable"
 LEAST_GAMES = 5
 """A figure that could be measured in fewer games is not compared."""
-_LEAST_MASS = 0.05  # both ends of the middle 90 % of the games
+_TAIL = 0.05  # of the games, on either side of their middle 90 %
 _CRASHES = (Outcome.COLLISION.word, Outcome.RAIL.word)
 _PER_MILLION_KM = 2.91
 
@@ -124,16 +123,15 @@ def realism(conduct: pd.DataFrame, arms: Mapping[str, Arm], *, people_drive: boo
     """
     found: list[dict[str, object]] = []
     for player, games in _players(conduct, arms).items():
-        of_people = OF_DRIVERS if people_drive or player in _egos(arms) else OF_WALKERS
+        of_people = OF_DRIVERS if people_drive or player in _egos(arms.values()) else OF_WALKERS
         found += (_compared(player, figure, games) for figure in of_people)
         found.append(_crashes(player, games[games["alone"]]))
     return table_of("realism", found)
 
 
-def _egos(arms: Mapping[str, Arm]) -> dict[str, EgoStrategy]:
-    """The naive and the retrained egos of a campaign, by their names in the table."""
-    egos = [arm.ego for arm in arms.values() if isinstance(arm.ego, NaiveEgo | RetrainedEgo)]
-    return {f"{strategy_name(ego)} ego": ego for ego in egos}
+def _egos(arms: Iterable[Arm]) -> set[str]:
+    """The naive and the retrained egos of arms, by their names in the table."""
+    return {f"{strategy_name(arm.ego)} ego" for arm in arms if isinstance(arm.ego, NaiveEgo | RetrainedEgo)}
 
 
 def _players(conduct: pd.DataFrame, arms: Mapping[str, Arm]) -> dict[str, pd.DataFrame]:
@@ -143,7 +141,7 @@ def _players(conduct: pd.DataFrame, arms: Mapping[str, Arm]) -> dict[str, pd.Dat
     found: dict[str, list[pd.DataFrame]] = {}
     for arm in own:
         games = conduct[conduct["arm"] == arm.name].assign(alone=arm.ego is None or arm.non_ego is None)
-        for name in _egos({arm.name: arm}):
+        for name in _egos([arm]):
             found.setdefault(name, []).append(games[games["player"] == ROLES[EGO]])
         person = arm.non_ego
         if isinstance(person, PersonaNonEgo) and persona_alone(person.persona) in own:
@@ -154,15 +152,14 @@ def _players(conduct: pd.DataFrame, arms: Mapping[str, Arm]) -> dict[str, pd.Dat
 
 def _compared(player: str, figure: HumanFigure, games: pd.DataFrame) -> dict[str, object]:
     chosen = games[games["alone"]] if figure.games is Games.ALONE else games
-    column = chosen.get(figure.metric, pd.Series(dtype=float))
-    values = column.dropna().to_numpy(dtype=float)
+    values = chosen[figure.metric].dropna().to_numpy(dtype=float)
     few = len(values) < LEAST_GAMES
     value = math.nan
     if not few:
         value = float(np.median(values) if figure.at_most is None else np.mean(values <= figure.at_most))
     comparable = not few and figure.source != ""
     verdict = (INSIDE if figure.low <= value <= figure.high else OUTSIDE) if comparable else NOT_COMPARABLE
-    spread = (math.nan, math.nan) if few else np.quantile(values, (_LEAST_MASS, 1.0 - _LEAST_MASS))
+    spread = (math.nan, math.nan) if few else np.quantile(values, (_TAIL, 1.0 - _TAIL))
     return {
         "player": player,
         "figure": figure.name,
@@ -186,7 +183,10 @@ def _reason(few: bool, figure: HumanFigure) -> str:
 
 
 def _crashes(player: str, alone: pd.DataFrame) -> dict[str, object]:
-    """Crashes per million km alone, with the exact 95 % Poisson interval: outside if people's rate is below it."""
+    """Crashes per million km alone, with the exact 95 % Poisson interval: outside if the rate of people is below it.
+
+    Else it is not comparable, because so few kilometres prove nothing.
+    """
     crashes, million_km = int(alone["outcome"].isin(_CRASHES).sum()), float(alone["distance_m"].sum()) / 1e9
     few = len(alone) < LEAST_GAMES or not million_km
     low = high = value = math.nan
@@ -194,6 +194,7 @@ def _crashes(player: str, alone: pd.DataFrame) -> dict[str, object]:
         value = crashes / million_km
         low = float(chi2.ppf(0.025, 2 * crashes)) / 2.0 / million_km if crashes else 0.0
         high = float(chi2.ppf(0.975, 2 * crashes + 2)) / 2.0 / million_km
+    outside = low > _PER_MILLION_KM  # false for NaN
     return {
         "player": player,
         "figure": CRASHES,
@@ -203,7 +204,7 @@ def _crashes(player: str, alone: pd.DataFrame) -> dict[str, object]:
         "low": low,
         "high": high,
         "people_high": _PER_MILLION_KM,
-        "realistic": NOT_COMPARABLE if few else OUTSIDE if low > _PER_MILLION_KM else INSIDE,
-        "reason": f"measured in fewer than {LEAST_GAMES} games" if few else "",
+        "realistic": OUTSIDE if outside else NOT_COMPARABLE,
+        "reason": "" if outside else f"{1e6 * million_km:.1f} km without another player are too few to tell",
         "source": CRASH_SOURCE,
     }

@@ -5,7 +5,7 @@
 
 So an arm continues where it stopped, needs the memory of one segment, however many games it has, and workers that have
 nothing else to do help its own: who plays a segment has its lock. A game depends on nothing but itself: the files of an
-arm are the same bytes with and without interruptions, and whoever plays its games.
+arm are the same bytes with and without interruptions, and do not depend on the workers that play it.
 """
 
 from __future__ import annotations
@@ -129,7 +129,7 @@ def play_segments(arm: SeatedArm, segments: Sequence[Segment], labels: Mapping[s
     """Play the games of an arm that are missing, and wait for those that helpers play.
 
     `labels` are the cells that all records share. The run is told of each episode before that game is played here, and
-    of the games played, by whomever, and their total. Raises as `assess` does, and StageFailed if the first ten games
+    of the games played, by any worker, and their total. Raises as `assess` does, and StageFailed if the first ten games
     can't be played for one reason, unless the run keeps going.
     """
     make_folder(segments[0].folder)

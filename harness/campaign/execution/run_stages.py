@@ -125,7 +125,7 @@ class _Helping:
 
     def next_help(self, stages: Iterable[Stage]) -> Help | None:
         """Help with the running arm that has most games left for each of its workers; None if no arm has a segment
-        left that nobody plays. Which of several best responses an arm plays, its own worker finds out."""
+        left that no worker plays. Which of several best responses an arm plays, its own worker finds out."""
         helped = Counter(each.arm.id for each in self.running.values())
         now = self._clock()
         arms = [
