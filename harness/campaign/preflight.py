@@ -16,10 +16,12 @@ from typing import Any
 from pydantic import ConfigDict
 
 from harness.campaign.plan.campaign_checks import check_names, check_people
+from harness.campaign.plan.plan import plan
+from harness.campaign.plan.stages import Stage
 from harness.campaign.plan.strategy_stages import crossplay_name
 from harness.campaign.trained_policies import check_policies, find_policies
 from harness.config.campaign import LEARNED, SUMO, Campaign, DocumentPath, Ego
-from harness.config.persona import Persona
+from harness.config.persona import Persona, lapsing
 from harness.config.toml_reading import Document, read_document
 from harness.drivers.car import car_of
 from harness.drivers.driver_files import sha256_of
@@ -86,6 +88,12 @@ class OpenCampaign:
         """Whether the ego is external and has tunable parameters."""
         return _is_tunable(self.ego_driver)
 
+    @property
+    def stages(self) -> list[Stage]:
+        """Every stage of its plan, each after those it needs."""
+        names = [persona.name for persona in self.personas]
+        return plan(self.document, names, self.tunable, lapsing(self.personas))
+
     def hash_of(self, path: Path) -> str:
         """SHA-256 of one of those files."""
         return self.hashes[_relative(self.file, path)]
@@ -139,7 +147,7 @@ def open_campaign(
     read = [each for each in personas if each is not None]
     tunable = _is_tunable(ego_driver)
     check_people(file, document, len(scene.document.non_ego))
-    check_names(file, document, [persona.name for persona in read], tunable)
+    check_names(file, document, [persona.name for persona in read], tunable, lapsing(read))
     files, policy_drivers = list[Path](), dict[str, ExternalDriver]()
     if policies is not None and policies_exist:
         files, policy_drivers = check_policies(

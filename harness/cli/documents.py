@@ -111,14 +111,13 @@ def check(
 def _check_campaign(file: Path, allow_code: bool, as_json: bool, console: Console) -> None:
     from harness.campaign.execution.repeat_check import varying_drivers
     from harness.campaign.plan.persona_remarks import persona_remarks
-    from harness.campaign.plan.plan import plan
     from harness.campaign.preflight import open_campaign
     from harness.config.campaign import LEARNED
     from harness.errors import plain
 
     opened = open_campaign(file, allow_code=allow_code)
     varying = varying_drivers(opened)
-    stages = plan(opened.document, [persona.name for persona in opened.personas], opened.tunable)
+    stages = opened.stages
     notes = opened.ego_driver.notes if opened.ego_driver is not None else ()
     ego = [] if opened.document.ego.driver == LEARNED else [messages.ego(opened), *notes]
     told = (*varying.items(), *opened.learned_elsewhere.items())

@@ -114,6 +114,9 @@ class Competence(Document):
     """Least share of its games alone in which an ego reaches its goal. 0: not asked of egos."""
     non_ego_goal_share: float = Field(0.8, ge=0.0, le=1.0)
     """Least share of its games alone in which a non-ego reaches its goal. 0: not asked of non-egos."""
+    non_ego_like_people: bool = True
+    """Whether a question is answered only if its person is not outside the range of people, in any figure of
+    `realism.csv` that its persona does not declare in `[[unlike_people]]`."""
 
 
 class Acceptance(Document):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -25,6 +25,23 @@ class Source(Document):
     """What was counted or measured, with the figure."""
     citation: str = Field(min_length=5, max_length=2000)
     """Author, publication and year."""
+
+
+COMPARED_WITH_PEOPLE = (
+    *("lane_change_s", "free_over_limit_mps", "following_gap_s", "accepted_gap_s", "max_deceleration_mps2"),
+    *("max_lateral_acceleration_mps2", "max_jerk_mps3", "lateral_wander_m", "latest_red_s_at_most_2"),
+    *("crashes_per_million_km", "crash_odds_ratio"),
+)
+"""The figures of `realism.csv` that have a published range."""
+
+
+class UnlikePeople(Document):
+    """A figure in which the person is known not to be like people: it withholds no answer about the person."""
+
+    figure: Annotated[str, one_of(COMPARED_WITH_PEOPLE, "unknown figure")]
+    """The figure, as in the column `figure` of `realism.csv`."""
+    reason: str = Field(min_length=10, max_length=1000)
+    """Why the person is asked about all the same; a sentence."""
 
 
 class Parametrised(Document):
@@ -209,6 +226,8 @@ class Persona(Document):
     """The driver in one sentence."""
     sources: list[Source] = Field(min_length=1, max_length=50)
     """The evidence for the persona: at least one statistic."""
+    unlike_people: list[UnlikePeople] = Field([], max_length=len(COMPARED_WITH_PEOPLE))
+    """The figures in which the person is known not to be like people."""
     safety: Group = Group()
     operational: Group = Group()
     human: Human = Human()
@@ -222,9 +241,13 @@ class Persona(Document):
     @model_validator(mode="after")
     def _terms_are_valid(self) -> Persona:
         mistakes = [mistake for group in GROUPS for mistake in self._mistakes_in(group)]
-        names = [each.name for each in self.human.fuzzy]
+        unique = {
+            ("human.fuzzy", "name", "give each term its own name"): [each.name for each in self.human.fuzzy],
+            ("unlike_people", "figure", "give one reason"): [each.figure for each in self.unlike_people],
+        }
         mistakes += [
-            (f"human.fuzzy[{k}].name", f"{name!r} occurs twice", "give each term its own name")
+            (f"{table}[{k}].{key}", f"{name!r} occurs twice", remedy)
+            for (table, key, remedy), names in unique.items()
             for k, name in enumerate(names)
             if name in names[:k]
         ]
@@ -272,6 +295,11 @@ class Persona(Document):
             reaction=Reaction(**_given(self.reaction)),
             actuator_shares=ActuatorShares(**_given(self.actuators)),
         )
+
+
+def lapsing(personas: Iterable[Persona]) -> list[str]:
+    """The names of the personas whose attention lapses."""
+    return [each.name for each in personas if each.attention is not None]
 
 
 def _given(table: Document | None) -> dict[str, Any]:

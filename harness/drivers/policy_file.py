@@ -29,7 +29,7 @@ from harness.game.arrays import FloatArray, IntArray
 from harness.game.observation_layout import LAYOUT
 
 FORMAT = 1
-_NOT_LEARNED_BY = ("name", "description", "sources")  # keys of a persona
+_NOT_LEARNED_BY = ("name", "description", "sources", "unlike_people")  # keys of a persona
 ACTIONS = 2
 ARCHIVES = (".zip", ".pkl", ".pickle", ".pt", ".pth", ".ckpt", ".joblib", ".npy", ".npz", ".onnx")
 _MAX_TENSOR_BYTES, _MAX_CARD_BYTES = 100_000_000, 1_000_000
@@ -103,7 +103,7 @@ def write_policy(policy: Policy, folder: Path) -> None:
 
 
 def persona_hash(persona: Persona) -> str:
-    """SHA-256 of what a policy learns by: the persona's document without its name, description and sources."""
+    """SHA-256 of what a policy learns by: the persona's document without `_NOT_LEARNED_BY`."""
     learned_by = {key: value for key, value in persona.record().items() if key not in _NOT_LEARNED_BY}
     return hashlib.sha256(json.dumps(learned_by, sort_keys=True).encode()).hexdigest()
 

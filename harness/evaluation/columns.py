@@ -28,7 +28,7 @@ _P = Column("p_value", NUMBER, "Of the paired one-tailed t-test.", unit=P_VALUE,
 _P_HOLM = Column(
     "p_holm", NUMBER, "Corrected for all tests of the table.", unit=P_VALUE, label="p after Holm", source="Holm 1979"
 )
-_REASON = Column("reason", TEXT, "Why there is no verdict for want of competence; else empty.")
+_REASON = Column("reason", TEXT, "Why the question is not answered; else empty.")
 _VERDICT = Column("verdict", TEXT, "What the row says about its question.")
 _FAILED = "Share of the games in which the ego failed."
 _FAILURE_RATE = Column("failure_rate", NUMBER, _FAILED, unit=SHARE)
@@ -126,16 +126,27 @@ _TABLES = {
     ),
     "realism": (
         Column("player", TEXT, "The ego or the persona."),
-        Column("figure", TEXT, "A column of `conduct.csv`, a share of its games, or `crashes_per_million_km`."),
+        SEED,
+        Column(
+            "figure",
+            TEXT,
+            "A column of `conduct.csv`, a share of its games, `crashes_per_million_km`, or `crash_odds_ratio`: alone, "
+            "against the same person without lapses of attention.",
+        ),
         Column("games", COUNT, "Games in which it could be measured."),
         Column("measured_in", TEXT, "`alone on the road`, or `all` games."),
-        Column("value", NUMBER, "The median over the games, their share, or the rate.", unit=OF_METRIC),
-        Column("low", NUMBER, "5 % of the games are below it; of the rate, 95 % low.", unit=OF_METRIC),
-        Column("high", NUMBER, "5 % of the games are above it; of the rate, 95 % high.", unit=OF_METRIC),
+        Column("value", NUMBER, "The median over the games, their share, the rate or the odds ratio.", unit=OF_METRIC),
+        Column("low", NUMBER, "5 % of the games are below it; of rate and odds ratio, 95 % low.", unit=OF_METRIC),
+        Column("high", NUMBER, "5 % of the games are above it; of rate and odds ratio, 95 % high.", unit=OF_METRIC),
         Column("people_low", NUMBER, "The low end of the range of people; empty: none.", unit=OF_METRIC),
         Column("people_high", NUMBER, "The high end of the range of people; empty: none.", unit=OF_METRIC),
-        Column("realistic", TEXT, "`inside`, `outside` or `not comparable`: value, and of the rate its low end."),
-        Column("reason", TEXT, "Why it is not comparable; else empty."),
+        Column(
+            "realistic",
+            TEXT,
+            "`inside`, `outside`, `outside, declared` or `not comparable`: the value, and of rate and odds ratio their "
+            "interval.",
+        ),
+        Column("reason", TEXT, "Why it is not comparable, or the reason that the persona declares; else empty."),
         Column("source", TEXT, "Where the range of people comes from."),
     ),
     "summary": tuple(_summary()),

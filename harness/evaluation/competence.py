@@ -1,10 +1,12 @@
-"""The research questions on two arms with their possible answers, and the competence gate.
+"""The research questions on two arms with their possible answers, and the gates before them.
 
 A verdict counts only if its players reach their goals without the other player.
 A person that wrecks itself on the empty road and an ego that fails against everybody answer no research question. So
 every question names the least share of goals of its players alone (`AloneBound`, from the campaign's table
 `[competence]`). The share is measured in the arms in which they are assessed alone, by the point estimate: goals per
 game that could be played. A goal of an ego that passed a red light, or drove among oncoming lanes, does not count.
+
+A question about a person that drives unlike people is not answered either (`Question.unlike_people`).
 """
 
 from __future__ import annotations
@@ -46,6 +48,8 @@ class Question:
     treatment: str
     alone: tuple[AloneBound, ...] = ()
     """What its players have to achieve alone; otherwise it is not answered."""
+    unlike_people: str = ""
+    """How its person differs from people, as a clause; empty if it does not, and otherwise it is not answered."""
 
 
 class Verdict(str, Enum):
@@ -64,17 +68,25 @@ class Verdict(str, Enum):
     """Fewer than two pairs could be compared."""
     EGO_CANNOT_DRIVE = "not answered: the ego can't drive this scene"
     """An ego of the question reaches its goal alone in fewer games than `AloneBound` asks. This verdict and the next
-    three go before all others: there is no test."""
+    four go before all others: there is no test."""
     NON_EGO_CANNOT_DRIVE = "not answered: the person can't drive this scene"
     NEITHER_CAN_DRIVE = "not answered: neither the ego nor the person can drive this scene"
     NOT_PLAYED_ALONE = "not answered: a player was not played alone"
     """It is not known whether the players can drive the scene."""
+    UNLIKE_PEOPLE = "not answered: the person is outside the range of people"
+    """All players can drive the scene, but the person does not drive as people do."""
 
 
-INCOMPETENT = frozenset(
-    {Verdict.EGO_CANNOT_DRIVE, Verdict.NON_EGO_CANNOT_DRIVE, Verdict.NEITHER_CAN_DRIVE, Verdict.NOT_PLAYED_ALONE}
+WITHHELD = frozenset(
+    {
+        Verdict.EGO_CANNOT_DRIVE,
+        Verdict.NON_EGO_CANNOT_DRIVE,
+        Verdict.NEITHER_CAN_DRIVE,
+        Verdict.NOT_PLAYED_ALONE,
+        Verdict.UNLIKE_PEOPLE,
+    }
 )
-"""The verdicts on players that were not shown to drive the scene."""
+"""The verdicts on players about which a question is not answered."""
 
 DID_NOT_LEARN = "did not learn"
 """How a training ended whose player misses its bound alone, whatever stopped it."""
@@ -146,7 +158,7 @@ def broken_by(record: Mapping[str, Any]) -> str:
 
 
 def gate(bounds: Iterable[AloneBound], seed: int, games: Mapping[Any, pd.DataFrame]) -> dict[str, str]:
-    """Why a verdict on these players does not count, as the cells `verdict` (one of `INCOMPETENT`) and `reason` (each
+    """Why a verdict on these players does not count, as the cells `verdict` (one of `WITHHELD`) and `reason` (each
     player below its bound, with its share) of a table; both are empty if it counts.
 
     `games` are the rows of episodes.csv by (arm, seed). A bound of 0 is always met.
@@ -178,3 +190,11 @@ def gate(bounds: Iterable[AloneBound], seed: int, games: Mapping[Any, pd.DataFra
         frozenset({"ego", "non_ego"}): Verdict.NEITHER_CAN_DRIVE,
     }.get(frozenset(incapable), Verdict.NOT_PLAYED_ALONE)
     return {"verdict": verdict.value, "reason": "; ".join(dict.fromkeys(clauses))}
+
+
+def gate_of(question: Question, games: Mapping[Any, pd.DataFrame]) -> dict[str, str]:
+    """The cells of `gate` for a question: its players drive the scene alone, and its person drives as people do."""
+    closed = gate(question.alone, question.seed, games)
+    if closed["reason"] or not question.unlike_people:
+        return closed
+    return {"verdict": Verdict.UNLIKE_PEOPLE.value, "reason": question.unlike_people}

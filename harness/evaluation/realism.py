@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from scipy.stats import chi2
+from scipy.stats.contingency import odds_ratio
 
 from harness.evaluation.strategies import (
     Arm,
@@ -24,11 +26,14 @@ from harness.game.outcome import Outcome
 from harness.game.roles import EGO, NON_EGO, ROLES
 
 INSIDE, OUTSIDE, NOT_COMPARABLE = "inside", "outside", "not comparable"
+DECLARED = "outside, declared"
+"""Outside, as the persona says in `[[unlike_people]]`."""
 LEAST_GAMES = 5
 """A figure that could be measured in fewer games is not compared."""
 _TAIL = 0.05  # of the games, on either side of their middle 90 %
 _CRASHES = (Outcome.COLLISION.word, Outcome.RAIL.word)
 _PER_MILLION_KM = 2.91
+_ODDS = (1.8, 7.2)
 
 
 class Games(Enum):
@@ -114,43 +119,72 @@ OF_DRIVERS = (
 OF_WALKERS = (HumanFigure(metric="accepted_gap_s", low=3.0, source="3 s at least (DiPietro and King 1970)"),)
 CRASHES = "crashes_per_million_km"
 CRASH_SOURCE = "2.91 crashed vehicles per million km (arXiv 2312.12675v3)"
+CRASH_ODDS = "crash_odds_ratio"
+ODDS_SOURCE = "3.6 with a hand-held telephone (Dingus et al. 2016, PNAS 113:2636); within a factor of 2"
 
 
-def realism(conduct: pd.DataFrame, arms: Mapping[str, Arm], *, people_drive: bool) -> pd.DataFrame:
-    """The table `realism` from the table `conduct`: a row for each player of a run and each figure.
+class _Player(NamedTuple):
+    name: str
+    persona: str
+    """Empty: an ego."""
+    seed: int
 
-    `arms`: by name. `people_drive`: the people of the scene are in cars.
+
+def realism(
+    conduct: pd.DataFrame, arms: Mapping[str, Arm], declared: Mapping[str, Mapping[str, str]], *, people_drive: bool
+) -> pd.DataFrame:
+    """The table `realism` from the table `conduct`: a row for each player of a run, training seed and figure.
+
+    `arms`: by name. `declared`: by persona, the figures in which it is known not to be like people, with the reason of
+    each. `people_drive`: the people of the scene are in cars.
     """
     found: list[dict[str, object]] = []
     for player, games in _players(conduct, arms).items():
-        of_people = OF_DRIVERS if people_drive or player in _egos(arms.values()) else OF_WALKERS
-        found += (_compared(player, figure, games) for figure in of_people)
-        found.append(_crashes(player, games[games["alone"]]))
+        of_people = OF_DRIVERS if people_drive or not player.persona else OF_WALKERS
+        alone = games[games["alone"]]
+        rows = [*(_compared(figure, games) for figure in of_people), _crashes(alone)]
+        attentive = persona_alone(player.persona, attentive=True)
+        if player.name == player.persona and attentive.name in arms:
+            with_open_eyes = (conduct["arm"] == attentive.name) & (conduct["seed"] == player.seed)
+            rows.append(_crash_odds(alone, _of_person(conduct[with_open_eyes], player.persona)))
+        reasons = declared.get(player.persona, {})
+        found += ({"player": player.name, "seed": player.seed, **_with_reason(row, reasons)} for row in rows)
     return table_of("realism", found)
 
 
-def _egos(arms: Iterable[Arm]) -> set[str]:
-    """The naive and the retrained egos of arms, by their names in the table."""
-    return {f"{strategy_name(arm.ego)} ego" for arm in arms if isinstance(arm.ego, NaiveEgo | RetrainedEgo)}
+def _with_reason(row: dict[str, object], reasons: Mapping[str, str]) -> dict[str, object]:
+    reason = reasons.get(str(row["figure"])) if row["realistic"] == OUTSIDE else None
+    return row if reason is None else row | {"realistic": DECLARED, "reason": reason}
 
 
-def _players(conduct: pd.DataFrame, arms: Mapping[str, Arm]) -> dict[str, pd.DataFrame]:
-    """The games of each ego and of each person of round 1. A population's and a crowd's people are left out: a game's
-    row does not say which persona drove."""
-    own = [arm for arm in arms.values() if arm.best_response_of is None]
-    found: dict[str, list[pd.DataFrame]] = {}
-    for arm in own:
+def _players(conduct: pd.DataFrame, arms: Mapping[str, Arm]) -> dict[_Player, pd.DataFrame]:
+    """The games of each ego and of each person, by training seed. A population's and a crowd's people are left out: a
+    game's row does not say which persona drove."""
+    found: dict[_Player, list[pd.DataFrame]] = {}
+    for arm, name, persona in _roles(arms.values()):
         games = conduct[conduct["arm"] == arm.name].assign(alone=arm.ego is None or arm.non_ego is None)
-        for name in _egos([arm]):
-            found.setdefault(name, []).append(games[games["player"] == ROLES[EGO]])
-        person = arm.non_ego
-        if isinstance(person, PersonaNonEgo) and persona_alone(person.persona) in own:
-            rows = games[(games["player"] == ROLES[NON_EGO]) & (games["persona"] == person.persona)]
-            found.setdefault(strategy_name(person), []).append(rows)
+        rows = _of_person(games, persona) if persona else games[games["player"] == ROLES[EGO]]
+        for seed, of_seed in rows.groupby("seed"):
+            found.setdefault(_Player(name, persona, int(str(seed))), []).append(of_seed)
     return {player: pd.concat(frames, ignore_index=True) for player, frames in found.items()}
 
 
-def _compared(player: str, figure: HumanFigure, games: pd.DataFrame) -> dict[str, object]:
+def _roles(arms: Iterable[Arm]) -> Iterator[tuple[Arm, str, str]]:
+    """Each arm with a player of it: its name in the table, and its persona."""
+    own = [arm for arm in arms if arm.best_response_of is None]
+    for arm in own:
+        if isinstance(arm.ego, NaiveEgo | RetrainedEgo):
+            yield arm, f"{strategy_name(arm.ego)} ego", ""
+        person = arm.non_ego
+        if isinstance(person, PersonaNonEgo) and not person.attentive and persona_alone(person.persona) in own:
+            yield arm, strategy_name(person), person.persona
+
+
+def _of_person(games: pd.DataFrame, persona: str) -> pd.DataFrame:
+    return games[(games["player"] == ROLES[NON_EGO]) & (games["persona"] == persona)]
+
+
+def _compared(figure: HumanFigure, games: pd.DataFrame) -> dict[str, object]:
     chosen = games[games["alone"]] if figure.games is Games.ALONE else games
     values = chosen[figure.metric].dropna().to_numpy(dtype=float)
     few = len(values) < LEAST_GAMES
@@ -161,7 +195,6 @@ def _compared(player: str, figure: HumanFigure, games: pd.DataFrame) -> dict[str
     verdict = (INSIDE if figure.low <= value <= figure.high else OUTSIDE) if comparable else NOT_COMPARABLE
     spread = (math.nan, math.nan) if few else np.quantile(values, (_TAIL, 1.0 - _TAIL))
     return {
-        "player": player,
         "figure": figure.name,
         "games": len(values),
         "measured_in": figure.games.value,
@@ -182,12 +215,12 @@ def _reason(few: bool, figure: HumanFigure) -> str:
     return "" if figure.source else "no published range was found"
 
 
-def _crashes(player: str, alone: pd.DataFrame) -> dict[str, object]:
+def _crashes(alone: pd.DataFrame) -> dict[str, object]:
     """Crashes per million km alone, with the exact 95 % Poisson interval: outside if the rate of people is below it.
 
     Else it is not comparable, because so few kilometres prove nothing.
     """
-    crashes, million_km = int(alone["outcome"].isin(_CRASHES).sum()), float(alone["distance_m"].sum()) / 1e9
+    crashes, million_km = _crashed(alone), float(alone["distance_m"].sum()) / 1e9
     few = len(alone) < LEAST_GAMES or not million_km
     low = high = value = math.nan
     if not few:
@@ -196,7 +229,6 @@ def _crashes(player: str, alone: pd.DataFrame) -> dict[str, object]:
         high = float(chi2.ppf(0.975, 2 * crashes + 2)) / 2.0 / million_km
     outside = low > _PER_MILLION_KM  # false for NaN
     return {
-        "player": player,
         "figure": CRASHES,
         "games": len(alone),
         "measured_in": Games.ALONE.value,
@@ -207,4 +239,39 @@ def _crashes(player: str, alone: pd.DataFrame) -> dict[str, object]:
         "realistic": OUTSIDE if outside else NOT_COMPARABLE,
         "reason": "" if outside else f"{1e6 * million_km:.1f} km without another player are too few to tell",
         "source": CRASH_SOURCE,
+    }
+
+
+def _crashed(games: pd.DataFrame) -> int:
+    return int(games["outcome"].isin(_CRASHES).sum())
+
+
+def _crash_odds(lapsing: pd.DataFrame, attentive: pd.DataFrame) -> dict[str, object]:
+    """The odds of a crash alone, against those of the same person without lapses: the conditional maximum likelihood
+    estimate with the exact 95 % interval (`scipy.stats.contingency.odds_ratio`).
+
+    It is outside if the interval is beside the range of people, and inside if the estimate is in the range. Else there
+    are too few crashes to tell.
+    """
+    sides, (least, most) = (lapsing, attentive), _ODDS
+    crashes = [_crashed(games) for games in sides]
+    value = low = high = math.nan
+    if min(map(len, sides)) >= LEAST_GAMES and 0 < sum(crashes) < sum(map(len, sides)):
+        found = odds_ratio([[crashed, len(games) - crashed] for crashed, games in zip(crashes, sides, strict=True)])
+        value, (low, high) = float(found.statistic), found.confidence_interval(0.95)
+    verdict = OUTSIDE if low > most or high < least else INSIDE if least <= value <= most else NOT_COMPARABLE
+    with_lapses, without = (f"{crashed} of {len(games)}" for crashed, games in zip(crashes, sides, strict=True))
+    few = f"crashes in {with_lapses} games with lapses and in {without} without are too few to tell"
+    return {
+        "figure": CRASH_ODDS,
+        "games": len(lapsing) + len(attentive),
+        "measured_in": Games.ALONE.value,
+        "value": value if math.isfinite(value) else None,
+        "low": low,
+        "high": high if math.isfinite(high) else None,
+        "people_low": least,
+        "people_high": most,
+        "realistic": verdict,
+        "reason": few if verdict == NOT_COMPARABLE else "",
+        "source": ODDS_SOURCE,
     }

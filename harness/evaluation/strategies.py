@@ -53,6 +53,8 @@ class PersonaNonEgo:
 
     persona: str
     round: int = 1
+    attentive: bool = False
+    """Whether its attention does not lapse: its eyes stay on the road."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,9 +96,9 @@ NAIVE_ALONE = Arm(ego=NaiveEgo())
 NAIVE_VS_SUMO = Arm(ego=NaiveEgo(), non_ego=SumoNonEgo())
 
 
-def persona_alone(persona: str) -> Arm:
+def persona_alone(persona: str, *, attentive: bool = False) -> Arm:
     """The arm of a persona's non-ego of round 1 without the ego."""
-    return Arm(non_ego=PersonaNonEgo(persona=persona))
+    return Arm(non_ego=PersonaNonEgo(persona=persona, attentive=attentive))
 
 
 def against_persona(ego: EgoStrategy, persona: str) -> Arm:
@@ -131,8 +133,8 @@ def strategy_name(strategy: Strategy) -> str:
             return driver
         case SumoNonEgo():
             return "sumo"
-        case PersonaNonEgo(persona=persona, round=round_):
-            return persona + (f"_round{round_}" if round_ > 1 else "")
+        case PersonaNonEgo(persona=persona, round=round_, attentive=attentive):
+            return persona + (f"_round{round_}" if round_ > 1 else "") + ("_attentive" if attentive else "")
         case BestResponse(arm=arm, start=start):
             return f"{arm.name}{start}"
 

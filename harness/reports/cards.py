@@ -20,6 +20,7 @@ from harness.reports.arm_figures import (
 )
 from harness.reports.differences import statistics
 from harness.reports.game_links import GameLinks
+from harness.reports.human_ranges import crashes_alone
 from harness.reports.key_figures import card_verdict, key_figures, portrait
 from harness.reports.numbers import MISSING, number, percent, sure
 from harness.reports.run_tables import QUESTIONS, Row, RunTables, failures, failures_of, played
@@ -186,17 +187,22 @@ def _by_driver(row: Row, *, several: bool) -> str:
 
 
 def _alone(persona: str, tables: RunTables) -> list[str]:
-    """How often a persona reaches its goal alone; of a crowd, each of its personas."""
+    """How often a persona reaches its goal and crashes alone; of a crowd, each of its personas."""
     lines: list[str] = []
     for member in dict.fromkeys(tables.crowds.get(persona, [persona])):
         reached = {
             seed: f"reaches its goal in {percent(row['non_ego_goal_rate'])} of {played(row)} games "
-            f"({_sure(row, 'non_ego_goal_rate')})."
+            f"({_sure(row, 'non_ego_goal_rate')}){_crashes(tables, member, seed)}."
             for seed, row in tables.rates_of(persona_alone(member).name).items()
         }
         named = f"{member}: " if persona in tables.crowds else ""
         lines += [f"{named}{line}" for line in _by_seed(reached)]
     return lines
+
+
+def _crashes(tables: RunTables, persona: str, seed: int) -> str:
+    crashes = crashes_alone(tables.realism, persona, seed)
+    return f", with {crashes}" if crashes else ""
 
 
 def _ordinary_driver(persona: str, tables: RunTables) -> list[str]:

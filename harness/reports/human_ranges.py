@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -11,15 +12,20 @@ from markupsafe import Markup
 
 from harness.evaluation.column import NUMBER, SHARE, Column
 from harness.evaluation.columns import TABLES
-from harness.evaluation.realism import CRASHES, NOT_COMPARABLE, OUTSIDE
+from harness.evaluation.realism import CRASH_ODDS, CRASHES, DECLARED, NOT_COMPARABLE, OUTSIDE
 from harness.reports.figures import GRID, INK, SERIES, figure_of, svg
-from harness.reports.numbers import MISSING, number, percent, short
+from harness.reports.numbers import MISSING, SURE, number, percent, short
 
 _WORDS = {
     "free_over_limit_mps": "speed over the limit on a free road",
     "latest_red_s_at_most_2": "passes on red within 2 s of its onset",
 }
-_CRASHES = Column(CRASHES, NUMBER, "Crashes alone on the road.", label="crashes per million km, alone")
+_OF_ARMS = {
+    CRASHES: Column(CRASHES, NUMBER, "Crashes alone on the road.", label="crashes per million km, alone"),
+    CRASH_ODDS: Column(
+        CRASH_ODDS, NUMBER, "Odds of a crash alone.", label="crash odds against the same person attentive"
+    ),
+}
 _ROW_IN, _AXES_IN, _WIDTH_IN = 0.22, 0.7, 4.0
 
 
@@ -28,16 +34,18 @@ class HumanRow:
     """A comparable row of `realism` in words."""
 
     player: str
+    """With its training seed where the table has several."""
     figure: str
     games: int
     value: str
     spread: str
     people: str
     realistic: str
+    """With the reason that a persona declares."""
 
     @property
     def is_outside(self) -> bool:
-        """Whether the player does what people do not."""
+        """Whether the player does what people do not, and its persona does not declare it."""
         return self.realistic == OUTSIDE
 
 
@@ -46,39 +54,89 @@ def comparable(realism: pd.DataFrame) -> pd.DataFrame:
     return realism[realism["realistic"] != NOT_COMPARABLE]
 
 
+def unlike_people(realism: pd.DataFrame, persona: str, seed: int) -> str:
+    """How a person differs from people, as a clause: each figure that is outside and not declared, with its value and
+    the range of people. Empty if there is none."""
+    found = "; ".join(map(_clause, _of_person(realism, persona, seed, OUTSIDE)))
+    return f"the {persona} driver is outside the range of people: {found}" if found else ""
+
+
+def declared_unlike(realism: pd.DataFrame, persona: str, seed: int) -> str:
+    """The same of the figures that its persona declares, as a sentence."""
+    found = "; ".join(map(_clause, _of_person(realism, persona, seed, DECLARED)))
+    return f"The {persona} driver is outside the range of people, as its persona declares: {found}." if found else ""
+
+
+def crashes_alone(realism: pd.DataFrame, persona: str, seed: int) -> str:
+    """How often a person crashes alone on the road, with the 95 % interval, as a clause; empty if it was not played."""
+    own = (realism["player"] == persona) & (realism["seed"] == seed) & (realism["figure"] == CRASHES)
+    per_km = realism.loc[own, ["value", "low", "high"]].dropna() / 1e6
+    if per_km.empty:
+        return ""
+    value, low, high = map(short, per_km.iloc[0].round(3))
+    return f"{value} crashes per km ({SURE}: {low}–{high})"
+
+
+def _of_person(realism: pd.DataFrame, persona: str, seed: int, verdict: str) -> list[Mapping[Any, Any]]:
+    own = (realism["player"] == persona) & (realism["seed"] == seed)
+    return realism[own & (realism["realistic"] == verdict)].to_dict("records")
+
+
+def _clause(row: Mapping[Any, Any]) -> str:
+    figure = row["figure"]
+    unit = "" if _is_share(figure) or not _column(figure).unit else f" {_column(figure).unit}"
+    people = _range(figure, row["people_low"], row["people_high"])
+    return f"{_words(figure)} {_value(row)}{unit}, people {people}{unit}"
+
+
 def human_rows(realism: pd.DataFrame) -> list[HumanRow]:
     """The comparable rows in words, player by player."""
-    return [
-        HumanRow(
-            player=row["player"],
-            figure=title_of(row["figure"]),
-            games=row["games"],
-            value=_text(row["figure"], row["value"]),
-            spread=f"{_text(row['figure'], row['low'])} to {_text(row['figure'], row['high'])}",
-            people=_range(row["figure"], row["people_low"], row["people_high"]),
-            realistic=row["realistic"],
-        )
-        for row in comparable(realism).to_dict("records")
-    ]
+    return list(map(_in_words, _named(comparable(realism), realism).to_dict("records")))
+
+
+def _named(rows: pd.DataFrame, realism: pd.DataFrame) -> pd.DataFrame:
+    """Rows of a table whose players have their training seed in their name where the table has several."""
+    if realism["seed"].nunique() < 2:
+        return rows
+    return rows.assign(player=rows["player"] + ", seed " + rows["seed"].astype(str))
+
+
+def _in_words(row: Mapping[Any, Any]) -> HumanRow:
+    figure, realistic = row["figure"], row["realistic"]
+    return HumanRow(
+        player=row["player"],
+        figure=title_of(figure),
+        games=row["games"],
+        value=_value(row),
+        spread=f"{_text(figure, row['low'])} to {_text(figure, row['high'])}",
+        people=_range(figure, row["people_low"], row["people_high"]),
+        realistic=f"{realistic}: {row['reason']}" if realistic == DECLARED else realistic,
+    )
 
 
 def headline(realism: pd.DataFrame) -> str:
     """What the table says, in a sentence."""
-    rows = comparable(realism)
-    outside = rows[rows["realistic"] == OUTSIDE]
+    rows = _named(comparable(realism), realism)
     if rows.empty:
         return "No figure could be compared with those of people."
-    if outside.empty:
+    outside, declared = (rows[rows["realistic"] == verdict] for verdict in (OUTSIDE, DECLARED))
+    if outside.empty and declared.empty:
         return f"Every player is inside the range of people in each of the {len(rows)} figures that can be compared."
-    names = ", ".join(f"{player} ({count})" for player, count in outside["player"].value_counts(sort=False).items())
-    return f"Outside the range of people in {len(outside)} of {len(rows)} figures: {names}."
+    found = f"Outside the range of people in {len(outside)} of {len(rows)} figures"
+    if not outside.empty:
+        found += f": {_counted(outside)}"
+    return f"{found}." if declared.empty else f"{found}; in {len(declared)} more as declared: {_counted(declared)}."
+
+
+def _counted(rows: pd.DataFrame) -> str:
+    return ", ".join(f"{player} ({count})" for player, count in rows["player"].value_counts(sort=False).items())
 
 
 def plots(realism: pd.DataFrame) -> list[tuple[Markup, str]]:
     """A plot for each figure that could be compared: the range of people, and each player's middle 90 % of games. With
     the source of the range."""
-    rows = comparable(realism)
-    groups = rows[rows["figure"] != CRASHES].groupby("figure", sort=False)
+    rows = _named(comparable(realism), realism)
+    groups = rows[~rows["figure"].isin([*_OF_ARMS])].groupby("figure", sort=False)
     return [
         (_plot(str(name), group, place), str(group["source"].iloc[0])) for place, (name, group) in enumerate(groups, 1)
     ]
@@ -86,18 +144,29 @@ def plots(realism: pd.DataFrame) -> list[tuple[Markup, str]]:
 
 def title_of(figure: str) -> str:
     """A figure in words, with its unit."""
-    column = _column(figure)
-    words = _WORDS.get(figure, column.words)
-    return f"{words} ({column.unit})" if column.unit and not _is_share(figure) else words
+    unit = _column(figure).unit
+    return f"{_words(figure)} ({unit})" if unit and not _is_share(figure) else _words(figure)
+
+
+def _words(figure: str) -> str:
+    return _WORDS.get(figure, _column(figure).words)
 
 
 def _column(figure: str) -> Column:
     metric = figure.partition("_at_most_")[0]
-    return _CRASHES if figure == CRASHES else TABLES["conduct"][metric]
+    return _OF_ARMS.get(figure) or TABLES["conduct"][metric]
 
 
 def _is_share(figure: str) -> bool:
     return "_at_most_" in figure or _column(figure).unit == SHARE
+
+
+def _value(row: Mapping[Any, Any]) -> str:
+    """The value; of an infinite odds ratio the low end of its interval."""
+    value, low = row["value"], row["low"]
+    if np.isnan(value) and not np.isnan(low):
+        return f"at least {_text(row['figure'], low)}"
+    return _text(row["figure"], value)
 
 
 def _text(figure: str, value: float) -> str:
@@ -122,7 +191,7 @@ def _plot(figure: str, rows: pd.DataFrame, place: int) -> Markup:
         low, high = rows["people_low"].fillna(left).iloc[0], rows["people_high"].fillna(right).iloc[0]
         axes.axvspan(low, high, color=GRID, zorder=0)
         for at, row in enumerate(rows.to_dict("records")):
-            colour = SERIES["persona" if row["realistic"] == OUTSIDE else "alone"]
+            colour = SERIES["persona" if row["realistic"] in (OUTSIDE, DECLARED) else "alone"]
             if not _is_share(figure):
                 axes.plot([row["low"], row["high"]], [at, at], color=colour, linewidth=2.0)
             axes.plot([row["value"]], [at], "o", color=colour, markersize=5)
@@ -137,5 +206,5 @@ def _plot(figure: str, rows: pd.DataFrame, place: int) -> Markup:
 
 
 def _spoken(rows: pd.DataFrame) -> Iterator[str]:
-    for row in human_rows(rows):
+    for row in map(_in_words, rows.to_dict("records")):
         yield f"{row.player}: {row.value}, people {row.people}: {row.realistic}"

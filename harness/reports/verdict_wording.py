@@ -9,8 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from harness.evaluation.competence import INCOMPETENT, Verdict
+from harness.evaluation.competence import WITHHELD, Verdict
 from harness.reports.differences import CHANCE, NO_T_STATISTIC, speed_sentence, too_few
+from harness.reports.human_ranges import declared_unlike
 from harness.reports.numbers import p_text
 from harness.reports.run_tables import Row, RunTables, failures_of, played
 
@@ -26,7 +27,7 @@ LABELS = {
     Verdict.NO_DIFFERENCE: "no difference",
     Verdict.ALL_EQUAL: "no t statistic",
     Verdict.NOT_ENOUGH_PAIRS: NOT_ANSWERED,
-    **{verdict: verdict.value for verdict in INCOMPETENT},
+    **{verdict: verdict.value for verdict in WITHHELD},
 }
 NO_ROUND_2 = "Round 2 was not played: this ego has nothing to train or to tune."
 
@@ -89,7 +90,7 @@ def _of_seed(tables: RunTables, question: str, persona: str, seed: int) -> Answe
         sentence = f"Not played: {' and '.join(unplayed)}." if unplayed else "The failures were not compared."
         return Answer(question=question, seed=seed, label=NOT_ANSWERED, sentence=sentence)
     verdict = Verdict(failure["verdict"])
-    if verdict in INCOMPETENT:
+    if verdict in WITHHELD:
         sentence = as_sentence(failure["reason"])
         return Answer(question=question, seed=seed, label=LABELS[verdict], sentence=sentence)
     sentence = _failure_sentence(tables, failure, before, after)
@@ -106,13 +107,13 @@ def _of_seed(tables: RunTables, question: str, persona: str, seed: int) -> Answe
         seed=seed,
         label=LABELS[verdict],
         tone=TONE_OF_YES[question] if verdict is Verdict.SIGNIFICANT else "open",
-        sentence=sentence + left_out(failure),
+        sentence=" ".join(filter(None, (sentence + left_out(failure), declared_unlike(tables.realism, persona, seed)))),
         speed=told_speed,
     )
 
 
 def as_sentence(reason: str) -> str:
-    """A reason for want of competence as a sentence."""
+    """The reason for a withheld answer as a sentence."""
     return f"{reason[:1].upper()}{reason[1:]}."
 
 

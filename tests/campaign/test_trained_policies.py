@@ -9,7 +9,7 @@ from types import MappingProxyType
 import pytest
 
 from harness.campaign.preflight import open_campaign
-from harness.config.persona import Persona
+from harness.config.persona import Persona, UnlikePeople
 from harness.config.toml_reading import read_document
 from harness.drivers.policy_file import Policy, persona_hash, read_policy, write_policy
 from harness.errors import UsageError
@@ -66,7 +66,9 @@ def test_policies__learned_by_another_payoff_are_refused(tmp_path: Path, anna: P
 
 def test_persona_hash__leaves_out_what_nothing_is_learned_by(anna: Path) -> None:
     persona = persona_of(anna)
-    described = persona.model_copy(update={"name": "bert", "description": "the same driver by another name"})
+    declared = [UnlikePeople(figure="max_jerk_mps3", reason="It is made for a test.")]
+    others = {"name": "bert", "description": "the same driver by another name", "unlike_people": declared}
+    described = persona.model_copy(update=others)
     assert persona_hash(described) == persona_hash(persona)
     assert persona_hash(persona.model_copy(update={"decisions": "sampled"})) != persona_hash(persona)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.evaluation.competence import DID_NOT_LEARN, INCOMPETENT
+from harness.evaluation.competence import DID_NOT_LEARN, WITHHELD
 from harness.evaluation.tables import read_csv
 from tests.support.shared import built_once
 from tests.support.tiny import carried_out, learned_run, write_campaign
@@ -48,7 +48,7 @@ def test_terminal__names_each_training_that_did_not_learn_and_answers_no_questio
 def test_comparisons__have_a_reason_and_no_test(run: Path) -> None:
     table = read_csv(run / "comparisons.csv")
     assert len(table) == 4
-    assert set(table["verdict"]) <= {verdict.value for verdict in INCOMPETENT}
+    assert set(table["verdict"]) <= {verdict.value for verdict in WITHHELD}
     assert table[["p_value", "p_holm"]].isna().all(axis=None)
     assert not table["rejects_h0"].any()
     assert table["reason"].str.contains("below 80 %", regex=False).all()

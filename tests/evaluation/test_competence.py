@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from harness.evaluation.comparisons.comparison import compare, games_by_arm
-from harness.evaluation.competence import AloneBound, Goals, Question, Verdict, gate, goals_alone
+from harness.evaluation.competence import AloneBound, Goals, Question, Verdict, gate, gate_of, goals_alone
 
 EGO = AloneBound(player="ego", words="the naive ego", arm="naive_alone", goal_share=0.97)
 PERSON = AloneBound(player="non_ego", words="the speedy driver", arm="speedy_alone", goal_share=0.8)
@@ -160,3 +160,25 @@ def test_compare__unanswered_questions_are_not_in_holms_family() -> None:
     with_it = [row for row in compared(episodes, RQ1, asked) if row["persona"] == "bert"]
     pd.testing.assert_frame_equal(pd.DataFrame(with_it), pd.DataFrame(compared(episodes, asked)))
     assert with_it[0]["p_holm"] == with_it[0]["p_value"]  # the only test of the family
+
+
+# --- a person that is unlike people -----------------------------------------------------------------------------------
+
+UNLIKE = "the speedy driver is outside the range of people: lane change 2.2 s, people 3.5 to 8 s"
+
+
+def test_compare__a_question_about_a_person_unlike_people_is_not_answered() -> None:
+    answered, other = replace(RQ1, seed=1), replace(RQ1, unlike_people=UNLIKE)
+    (counted, _), (withheld, speed) = compared(table(100, 100), answered), compared(table(100, 100), other)
+    assert counted["verdict"] == Verdict.SIGNIFICANT.value
+    for row in (withheld, speed):
+        assert (row["verdict"], row["reason"]) == (Verdict.UNLIKE_PEOPLE.value, UNLIKE)
+        assert not row["rejects_h0"]
+        assert all(pd.isna(row[name]) for name in ("t", "p_value", "p_holm", "effect_size", "mcnemar_p"))  # type: ignore[call-overload]
+    assert withheld["mean_difference"] == counted["mean_difference"] == 0.99
+
+
+def test_gate_of__want_of_competence_goes_before() -> None:
+    question, games = replace(RQ1, unlike_people=UNLIKE), games_by_arm(table(100, 79))
+    assert gate_of(question, games) == gate(RQ1.alone, 1, games)
+    assert gate_of(question, games)["verdict"] == Verdict.NON_EGO_CANNOT_DRIVE.value

@@ -7,10 +7,13 @@ from typing import Any
 
 import pandas as pd
 import pytest
-from scipy.stats import norm
+from scipy.stats import nchypergeom_fisher, norm
 
+from harness.config.persona import COMPARED_WITH_PEOPLE
 from harness.evaluation.realism import (
+    CRASH_ODDS,
     CRASHES,
+    DECLARED,
     INSIDE,
     LEAST_GAMES,
     NOT_COMPARABLE,
@@ -32,8 +35,13 @@ def games(arm: str, player: str, count: int = LEAST_GAMES, **cells: Any) -> pd.D
     return table_of("conduct", pd.DataFrame(columns).to_dict("records"))
 
 
-def found(*frames: pd.DataFrame, arms: dict[str, Arm] = ARMS, people_drive: bool = True) -> dict[Any, dict[Any, Any]]:
-    rows = realism(pd.concat(frames, ignore_index=True), arms, people_drive=people_drive)
+def found(
+    *frames: pd.DataFrame,
+    arms: dict[str, Arm] = ARMS,
+    declared: dict[str, dict[str, str]] = {},  # noqa: B006
+    people_drive: bool = True,
+) -> dict[Any, dict[Any, Any]]:
+    rows = realism(pd.concat(frames, ignore_index=True), arms, declared, people_drive=people_drive)
     return {(row["player"], row["figure"]): row for row in rows.to_dict("records")}
 
 
@@ -93,6 +101,64 @@ def test_crashes__are_outside_where_the_interval_is_above_the_rate_of_people() -
     assert none["high"] == pytest.approx(3_688_879, rel=1e-3)
 
 
+def test_crash_odds__are_those_alone_against_the_same_person_without_lapses() -> None:
+    """Of 13 crashes in all, those with lapses have Fisher's noncentral hypergeometric distribution: the estimate makes
+    10 their mean, and at the ends of the interval 10 or more, or 10 or fewer, have the probability 0.025."""
+    arms = ARMS | {"speedy_attentive_alone": persona_alone("speedy", attentive=True)}
+
+    def odds(crashes: int, attentive: int) -> dict[Any, Any]:
+        sides = (("speedy_alone", crashes), ("speedy_attentive_alone", attentive))
+        frames = [games(arm, "non_ego", 50, outcome=["rail"] * n + ["goal"] * (50 - n)) for arm, n in sides]
+        return found(*frames, arms=arms)["speedy", CRASH_ODDS]
+
+    row = odds(10, 3)
+    assert nchypergeom_fisher(100, 13, 50, row["value"]).mean() == pytest.approx(10.0)
+    assert nchypergeom_fisher(100, 13, 50, row["low"]).sf(9) == pytest.approx(0.025, rel=1e-3)
+    assert nchypergeom_fisher(100, 13, 50, row["high"]).cdf(10) == pytest.approx(0.025, rel=1e-3)
+    assert (row["games"], row["people_low"], row["people_high"], row["realistic"]) == (100, 1.8, 7.2, INSIDE)
+    never = odds(20, 0)  # an infinite estimate: the interval alone tells
+    assert (math.isnan(never["value"]), never["realistic"]) == (True, OUTSIDE)
+    assert never["low"] > 7.2
+    few = odds(1, 1)
+    assert (few["value"], few["realistic"]) == (pytest.approx(1.0), NOT_COMPARABLE)
+    assert few["reason"] == "crashes in 1 of 50 games with lapses and in 1 of 50 without are too few to tell"
+    none = odds(0, 0)
+    assert (math.isnan(none["value"]), none["realistic"]) == (True, NOT_COMPARABLE)
+
+
+def test_crash_odds__do_not_mix_the_attentive_games_with_the_person_s_own() -> None:
+    arms = ARMS | {"speedy_attentive_alone": persona_alone("speedy", attentive=True)}
+    own = games("speedy_alone", "non_ego", lane_change_s=5.0)
+    attentive = games("speedy_attentive_alone", "non_ego", lane_change_s=1.0)
+    rows = found(own, attentive, arms=arms)
+    assert (rows["speedy", "lane_change_s"]["games"], rows["speedy", "lane_change_s"]["value"]) == (5, 5.0)
+    assert {player for player, _ in rows} == {"speedy"}
+    assert ("speedy", CRASH_ODDS) not in found(own)  # a person without lapses
+
+
+def test_seeds__have_rows_of_their_own() -> None:
+    arms = (
+        games("speedy_alone", "non_ego", lane_change_s=5.0),
+        games("speedy_alone", "non_ego", seed=2, lane_change_s=2.0),
+    )
+    rows = realism(pd.concat(arms), ARMS, {}, people_drive=True).query("figure == 'lane_change_s'")
+    assert list(zip(rows["seed"], rows["realistic"], strict=True)) == [(1, INSIDE), (2, OUTSIDE)]
+
+
+def test_declared__figures_say_the_reason_where_they_are_outside() -> None:
+    reasons = {"speedy": {"lane_change_s": "It is the driver of the paper.", "max_jerk_mps3": "The same."}}
+    rows = found(games("speedy_alone", "non_ego", lane_change_s=2.0, max_jerk_mps3=1.0), declared=reasons)
+    change, jerk = rows["speedy", "lane_change_s"], rows["speedy", "max_jerk_mps3"]
+    assert (change["realistic"], change["reason"]) == (DECLARED, "It is the driver of the paper.")
+    assert (jerk["realistic"], jerk["reason"]) == (INSIDE, "")
+
+
+def test_figures__that_a_persona_may_declare_are_those_with_a_published_range() -> None:
+    published = [each.name for each in OF_DRIVERS if each.source]
+    assert [*COMPARED_WITH_PEOPLE] == [*published, CRASHES, CRASH_ODDS]
+    assert {each.name for each in OF_WALKERS} <= {*COMPARED_WITH_PEOPLE}
+
+
 def test_players__egos_drive_and_people_on_foot_have_figures_of_their_own() -> None:
     rows = found(games("naive_alone", "ego"), games("speedy_alone", "non_ego"), people_drive=False)
     assert [figure for player, figure in rows if player == "naive ego"] == [
@@ -104,5 +170,5 @@ def test_players__egos_drive_and_people_on_foot_have_figures_of_their_own() -> N
 
 def test_players__a_population_is_none() -> None:
     arms = {arm.name: arm for arm in (NAIVE_ALONE, against_persona(NaiveEgo(), "commuters"))}
-    rows = found(games("naive_vs_commuters", "non_ego", persona="commuters"), arms=arms)
+    rows = found(games("naive_alone", "ego"), games("naive_vs_commuters", "non_ego", persona="commuters"), arms=arms)
     assert {player for player, _ in rows} == {"naive ego"}

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from harness.evaluation.comparisons.summary import summarise
-from harness.evaluation.competence import INCOMPETENT, Verdict
+from harness.evaluation.competence import WITHHELD, Verdict
 from harness.evaluation.worst_first import worst_first
 from harness.replay.selection import choose_games, replay_name
 from harness.reports import page as page_module
@@ -156,7 +156,7 @@ def test_words__only_significant_is_a_yes(verdict, question, small):
     assert (found.label == "yes") == yes
     assert (found.tone != "open") == yes
     assert found.sentence.endswith(".")
-    if verdict in INCOMPETENT:  # no number of the games is an answer
+    if verdict in WITHHELD:  # no number of the games is an answer
         assert (found.label, found.tone, found.speed) == (verdict.value, "open", "")
         assert found.sentence == "The speedy driver can't drive this scene."
         return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from tests.support.tiny import write_campaign
 def planned(folder: Path, **changes: Any) -> tuple[dict[str, Stage], dict[str, str]]:
     """A campaign's stages and their keys, by id and in order."""
     campaign = open_campaign(write_campaign(folder, **changes))
-    stages = plan(campaign.document, [persona.name for persona in campaign.personas], campaign.tunable)
+    stages = campaign.stages
     assert len({stage.id for stage in stages}) == len(stages)
     return {stage.id: stage for stage in stages}, stage_keys(campaign, stages)
 
@@ -31,9 +32,9 @@ def campaign_of(*personas: str, **changes: Any) -> Campaign:
     return Campaign.model_validate({**document, **changes})
 
 
-def stages_of(*personas: str, tunable: bool = False, **changes: Any) -> dict[str, Any]:
+def stages_of(*personas: str, tunable: bool = False, lapsing: Sequence[str] = (), **changes: Any) -> dict[str, Any]:
     """The stages of `campaign_of`, by name and in order. It has one seed."""
-    return {stage.name: stage for stage in plan(campaign_of(*personas, **changes), personas, tunable)}
+    return {stage.name: stage for stage in plan(campaign_of(*personas, **changes), personas, tunable, lapsing)}
 
 
 def training_of(name: str, *needs: str, seed: int = 1) -> Stage:

@@ -39,7 +39,7 @@ TRAINING: dict[str, Any] = {
     "epochs": 2,
     "network": [8],
 }
-UNGATED: dict[str, Any] = {"ego_goal_share": 0.0, "non_ego_goal_share": 0.0}
+UNGATED: dict[str, Any] = {"ego_goal_share": 0.0, "non_ego_goal_share": 0.0, "non_ego_like_people": False}
 """Bounds that every player meets: tiny trainings learn nothing, and most tests are about what comes after them."""
 PERSONA = """\
 name = "{name}"

@@ -47,7 +47,8 @@ def _inputs(campaign: OpenCampaign, stage: Stage) -> dict[str, Any]:
     own = [stage.persona] if stage.persona in personas else []
     players = members_of(*(stage.opponent if isinstance(stage, TrainingStage | SearchStage) else stage.drivers))
     names = dict.fromkeys(["", *own, *map(persona_of, players)])
-    inputs: dict[str, Any] = {"stage": repr(stage), "personas": [personas[name].record() for name in names]}
+    people = [personas[name].model_dump(mode="json", exclude={"unlike_people"}) for name in names]  # it changes no game
+    inputs: dict[str, Any] = {"stage": repr(stage), "personas": people}
     match stage:
         case TrainingStage():
             inputs["training"] = training_settings(document, stage).record()

@@ -31,6 +31,7 @@ from harness.campaign.storage.arm_tables import arm_tables
 from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.trained_policies import DRIVER
 from harness.config.driver import read_driver
+from harness.config.persona import Persona
 from harness.config.tunable import Adjustable
 from harness.drivers.car import car_of
 from harness.drivers.mixture import Member, Mixture
@@ -110,11 +111,16 @@ class PlayerFactory:
     def _mixture(self, members: tuple[PlannedMember, ...], shares: tuple[float, ...]) -> Mixture:
         return Mixture(
             tuple(
-                Member(driver=self.driver(each), persona=self.context.persona(persona_of(each)), share=share)
+                Member(driver=self.driver(each), persona=self._persona(each), share=share)
                 for each, share in zip(members, shares, strict=True)
                 if share > _LEAST_SHARE
             )
         )
+
+    def _persona(self, planned: PlannedMember) -> Persona:
+        persona = self.context.persona(persona_of(planned))
+        is_attentive = isinstance(planned, Trained | TrainedBefore) and planned.attentive
+        return persona.model_copy(update={"attention": None}) if is_attentive else persona
 
     def driver(self, planned: PlannedMember) -> Driver:
         """The driver itself, without its persona."""

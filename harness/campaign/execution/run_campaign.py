@@ -15,7 +15,6 @@ from harness.campaign.execution.repeat_check import CHECKING as REPEATING
 from harness.campaign.execution.repeat_check import varying_drivers
 from harness.campaign.execution.run_stages import StartWorkers, run_stages
 from harness.campaign.execution.stage_run import Event, run_context_of
-from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import Stage, TrainingStage
 from harness.campaign.preflight import OpenCampaign
 from harness.campaign.results.kept_results import RunResult, kept_result
@@ -52,7 +51,7 @@ def run_campaign(
         differences = (*varying.items(), *campaign.learned_elsewhere.items())
         for line in (*campaign.scene.warnings, *(plain(f"{driver}: {words}") for driver, words in differences)):
             console.print(line, style="bold yellow", highlight=False, markup=False)
-        stages = plan(campaign.document, [persona.name for persona in campaign.personas], campaign.tunable)
+        stages = campaign.stages
         keys = stage_keys(campaign, stages)
         with console.status(CHECKING):
             manifest = _ManifestKeeper(campaign, folder, stages=stages, keys=keys, varying=varying)

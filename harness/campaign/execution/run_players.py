@@ -8,7 +8,6 @@ from pathlib import Path, PurePosixPath
 
 from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import RunContext
-from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import (
     AssessmentStage,
     BestOf,
@@ -22,7 +21,7 @@ from harness.campaign.plan.stages import (
     driver_in,
     persona_of,
 )
-from harness.campaign.storage.manifest import is_tuned
+from harness.campaign.storage.manifest import planned
 from harness.campaign.storage.run_folder import MANIFEST, RunFolder
 from harness.config.campaign import Campaign
 from harness.config.persona import Persona
@@ -61,7 +60,7 @@ class RunPlayers:
         self.scene: OpenScene = open_scene(folder.scene, driver.vehicle_type if driver is not None else None)
         self._folder, self._ego = folder, driver
         document = Campaign.model_validate(manifest["campaign"], strict=False)
-        self._stages = plan(document, manifest["personas"], is_tuned(manifest))
+        self._stages = planned(manifest)
         self._context = RunContext(
             folder=folder,
             document=document,

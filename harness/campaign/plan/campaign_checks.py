@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import TypeAlias
 
@@ -27,11 +27,13 @@ def check_people(file: Path, document: Campaign, people: int) -> None:
     _refuse(file, _people(document, people))
 
 
-def check_names(file: Path, document: Campaign, personas: Sequence[str], tunable: bool = False) -> None:
-    """Raises UsageError for every name that refers to nothing, or to two things; `tunable` as in `plan`."""
+def check_names(
+    file: Path, document: Campaign, personas: Sequence[str], tunable: bool = False, lapsing: Collection[str] = ()
+) -> None:
+    """Raises UsageError for every name that refers to nothing, or to two things; `tunable`, `lapsing` as in `plan`."""
     _refuse(file, (*_personas(document, personas), *_other_egos(document)))
     _refuse(file, _arms(document, personas, tunable))
-    _refuse(file, _stages(document, personas, tunable))
+    _refuse(file, _stages(document, personas, tunable, lapsing))
 
 
 def _refuse(file: Path, found: _Found | Sequence[tuple[str, str, str]]) -> None:
@@ -105,10 +107,10 @@ def _arms(document: Campaign, personas: Sequence[str], tunable: bool) -> _Found:
             yield "best_response.arms", message, nearest(name, pairs)
 
 
-def _stages(document: Campaign, personas: Sequence[str], tunable: bool) -> _Found:
+def _stages(document: Campaign, personas: Sequence[str], tunable: bool, lapsing: Collection[str]) -> _Found:
     """Stages are named after personas: two of them may have the same name."""
     stages: dict[str, list[str]] = {}
-    for stage in plan(document.model_copy(update={"policies": None}), personas, tunable):
+    for stage in plan(document.model_copy(update={"policies": None}), personas, tunable, lapsing):
         stages.setdefault(stage.id, []).append(stage.persona)
     clashes = {tuple(sorted(filter(None, of))): name for name, of in stages.items() if len(of) > 1}
     for of, name in clashes.items():

@@ -6,8 +6,9 @@
 | 1 | for each persona: train `<persona>` against the naive ego; assess `<persona>_alone`, `naive_vs_<persona>` |
 | 2 | for each persona: train `retrained_<persona>`; assess `retrained_vs_<persona>`, `retrained_alone_<persona>` |
 
-A persona drives in every place of the non-egos, and in one at a time without the ego (`<persona>_alone`). A population
-or crowd is an opponent like a persona, but its members are trained as personas. `robust` is the ego retrained against
+A persona drives in every place of the non-egos, and in one at a time without the ego (`<persona>_alone`). A persona
+with `[attention]` is also assessed alone with its eyes on the road (`<persona>_attentive_alone`). A population or crowd
+is an opponent like a persona, but its members are trained as personas. `robust` is the ego retrained against
 several personas at once. Round 2 of an external ego is a parameter search, if it has tunable parameters. A campaign
 with a folder of policies has the same arms and no trainings.
 """
@@ -56,6 +57,8 @@ def plan_paper_rounds(of: SeedStages, personas: Sequence[str]) -> list[Stage]:
             stages.append(of.training(retrained, of.side(PersonaNonEgo(persona=name)), persona=name))
         if name in personas:
             stages.append(of.assessment(persona_alone(name), persona=name))
+        if name in of.lapsing:
+            stages.append(of.assessment(persona_alone(name, attentive=True), persona=name))
         stages.append(of.assessment(against_persona(NaiveEgo(), name), persona=name))
         stages += _round_2_arms(of, retrained) if learns else []
     return stages

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 from harness.campaign.plan.iterated_rounds import PersonaRounds, persona_rounds, plan_best_responses
 from harness.campaign.plan.paper_rounds import plan_paper_rounds, plan_robust, plan_searches
@@ -15,13 +15,15 @@ from harness.config.campaign import Campaign
 from harness.evaluation.strategies import EgoStrategy, OtherEgo, ReconfiguredEgo, RetrainedEgo, RobustEgo
 
 
-def plan(campaign: Campaign, personas: Sequence[str], tunable: bool = False) -> list[Stage]:
+def plan(
+    campaign: Campaign, personas: Sequence[str], tunable: bool = False, lapsing: Collection[str] = ()
+) -> list[Stage]:
     """Every stage of a campaign with these personas, each after those it needs.
 
-    `tunable`: the campaign's ego is external and has tunable parameters. A campaign with a folder of policies trains
-    nothing but best responses.
+    `tunable`: the campaign's ego is external and has tunable parameters. `lapsing`: the personas whose
+    attention lapses. A campaign with a folder of policies trains nothing but best responses.
     """
-    seeds = [SeedStages(campaign=campaign, seed=seed) for seed in campaign.seeds]
+    seeds = [SeedStages(campaign=campaign, seed=seed, lapsing=lapsing) for seed in campaign.seeds]
     stages = [stage for of in seeds for stage in _plan_seed(of, personas, tunable)]
     if campaign.policies is None:
         return stages

@@ -42,6 +42,8 @@ class Trained:
     stage: str
     persona: str = ""
     """The persona with which it drives; empty: the ego's own."""
+    attentive: bool = False
+    """Whether it drives without the persona's lapses of attention."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,6 +53,8 @@ class TrainedBefore:
     stage: str
     persona: str = ""
     """The persona with which it drives; empty: the ego's own."""
+    attentive: bool = False
+    """Whether it drives without the persona's lapses of attention."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import PurePath
 
@@ -62,6 +62,8 @@ class SeedStages:
 
     campaign: Campaign
     seed: int
+    lapsing: Collection[str] = ()
+    """The personas whose attention lapses."""
     gates: dict[EgoStrategy | NonEgoStrategy, tuple[EquilibriumGate, ...]] = field(default_factory=dict)
     """Of the strategies after round 2: the gates before their trainings."""
 
@@ -119,8 +121,8 @@ class SeedStages:
                 return Reconfigured(stage=stage_id(strategy_name(strategy), self.seed))
             case NaiveEgo() if not ego_learns(self.campaign):
                 return SumoDriven() if self.campaign.ego.driver == SUMO else External()
-            case PersonaNonEgo(persona=persona):
-                return self._learned(strategy, persona)
+            case PersonaNonEgo(persona=persona, attentive=attentive):
+                return replace(self._learned(replace(strategy, attentive=False), persona), attentive=attentive)
             case _:
                 return self._learned(strategy)
 

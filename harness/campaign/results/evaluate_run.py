@@ -8,10 +8,10 @@ from typing import Any
 
 import pandas as pd
 
-from harness.campaign.plan.paper_rounds import questions
 from harness.campaign.plan.stages import AssessmentStage, TrainingStage, stage_id
 from harness.campaign.results.matchups import matchups_of
 from harness.campaign.results.read_run import ReadRun
+from harness.campaign.results.realism_gate import declared_of, questions_of
 from harness.campaign.storage.learned import judged
 from harness.campaign.storage.manifest import is_tuned
 from harness.config.campaign import Campaign
@@ -20,7 +20,7 @@ from harness.evaluation.comparisons.acceptance_checks import Evidence, judge
 from harness.evaluation.comparisons.comparison import compare, games_by_arm
 from harness.evaluation.comparisons.preventability import count_prevented
 from harness.evaluation.comparisons.summary import summarise
-from harness.evaluation.competence import Goals, Question, goals_alone
+from harness.evaluation.competence import Goals, goals_alone
 from harness.evaluation.game_theory.findings import GameFindings, find
 from harness.evaluation.people import people_in
 from harness.evaluation.realism import realism
@@ -41,18 +41,19 @@ def evaluated(run: ReadRun) -> RunTables:
     if run.reference_drivers is not None:
         counts = count_prevented(run.reference_drivers, run.episodes)
         prevented = {"reference_drivers": run.reference_drivers, "preventability": counts}
+    found = realism(run.conduct, _arms(run), declared_of(run), people_drive=_people_drive(run))
     tables = RunTables(
         manifest=manifest,
         arms=_arms(run),
         strategies={stage.name: stage.strategy for stage in run.stages if isinstance(stage, TrainingStage)},
         episodes=run.episodes,
         summary=summarise(run.episodes),
-        comparisons=compare(_questions(run), run.episodes, run.campaign.assessment.significance),
+        comparisons=compare(questions_of(run, found), run.episodes, run.campaign.assessment.significance),
         training=_with_ends(run.training, entries),
         reconfiguration=run.reconfiguration,
         manoeuvres=run.manoeuvres,
         causes=run.causes,
-        realism=realism(run.conduct, _arms(run), people_drive=_people_drive(run)),
+        realism=found,
         game=_game(run),
         non_ego_drives=_people_drive(run),
         populations=by_who_drove(run.campaign, run.episodes),
@@ -105,25 +106,13 @@ def _with_ends(training: pd.DataFrame, entries: Mapping[str, Mapping[str, Any]])
     return training.assign(stopped=pd.Series(ends, index=last.index, dtype=object).reindex(training.index).fillna(""))
 
 
-def _questions(run: ReadRun) -> list[Question]:
-    return [
-        question
-        for question in questions(run.campaign, run.manifest["personas"], is_tuned(run.manifest))
-        if {stage_id(arm, question.seed) for arm in (question.baseline, question.treatment)} <= _done(run)
-    ]
-
-
 def _game(run: ReadRun) -> GameFindings | None:
     """The findings on the game between strategies, from the finished arms of a run; None where it is not asked."""
-    game = matchups_of(run.campaign, run.manifest["personas"], _done(run), is_tuned(run.manifest))
+    game = matchups_of(run.campaign, run.manifest["personas"], run.done, is_tuned(run.manifest))
     if game is None:
         return None
     significance = run.campaign.assessment.significance
     return find(game.pairings, game.responses, game.training_personas, run.episodes, significance)
-
-
-def _done(run: ReadRun) -> set[str]:
-    return {name for name, entry in run.manifest["stages"].items() if entry["status"] == "done"}
 
 
 def by_who_drove(campaign: Campaign, episodes: pd.DataFrame) -> pd.DataFrame:

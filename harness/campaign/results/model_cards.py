@@ -1,7 +1,7 @@
 """Model cards: a README.md beside each policy of a run that describes the policy, its training and its results.
 
-A card contains data of the run's manifest, its summary and the policy's JSON only, without timings: the same campaign
-gives the same card.
+A card contains data of the run's manifest, its summary, its figures of people and the policy's JSON only, without
+timings: the same campaign gives the same card.
 """
 
 from __future__ import annotations
@@ -12,9 +12,8 @@ from typing import Any
 
 import pandas as pd
 
-from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage, Trained
-from harness.campaign.storage.manifest import is_tuned
+from harness.campaign.storage.manifest import planned
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign
 from harness.config.persona import Persona
@@ -24,6 +23,7 @@ from harness.evaluation.strategies import NaiveEgo, strategy_name
 from harness.files import write_atomically
 from harness.game.payoff_terms import GROUPS, TERMS
 from harness.game.roles import NON_EGO, ROLES
+from harness.reports.human_ranges import crashes_alone
 from harness.reports.learning import stopped
 from harness.reports.numbers import MISSING, interval, number, percent
 from harness.reports.page_template import environment_of
@@ -34,15 +34,22 @@ _PROGRAMS = ("python", "eclipse-sumo", "torch", "stable-baselines3", "numpy")
 
 
 def write_model_cards(
-    folder: RunFolder, manifest: Mapping[str, Any], policies: Mapping[str, Mapping[str, Any]], summary: pd.DataFrame
+    folder: RunFolder,
+    manifest: Mapping[str, Any],
+    policies: Mapping[str, Mapping[str, Any]],
+    summary: pd.DataFrame,
+    realism: pd.DataFrame,
 ) -> None:
-    """Write the card of every policy of `policies`, the policy.json of each training stage."""
-    cards = {stage: model_card(stage, manifest, summary, policy) for stage, policy in policies.items()}
+    """Write the card of every policy of `policies`, the policy.json of each training stage. `summary` and `realism` are
+    the run's tables of these names."""
+    cards = {stage: model_card(stage, manifest, summary, realism, policy) for stage, policy in policies.items()}
     for stage, card in cards.items():
         write_atomically(folder.policy(stage) / CARD, card.encode())
 
 
-def model_card(stage: str, manifest: Mapping[str, Any], summary: pd.DataFrame, policy: Mapping[str, Any]) -> str:
+def model_card(
+    stage: str, manifest: Mapping[str, Any], summary: pd.DataFrame, realism: pd.DataFrame, policy: Mapping[str, Any]
+) -> str:
     """The card of the policy that a training stage made; `policy` is the content of its policy.json."""
     entry = manifest["stages"][stage]
     is_ego = policy["player"] != ROLES[NON_EGO]
@@ -68,6 +75,7 @@ def model_card(stage: str, manifest: Mapping[str, Any], summary: pd.DataFrame, p
         attends=[*profile.attends, profile.decides],
         sources=persona.sources,
         figures=list(_figures(stage, manifest, summary, is_ego)),
+        crashes="" if is_ego else crashes_alone(realism, entry["name"], entry["seed"]),
         settings=[(name, _shown(value)) for name, value in policy["training"].items()],
         versions=", ".join(f"{name} {versions[name]}" for name in _PROGRAMS if name in versions),
     )
@@ -140,9 +148,9 @@ def _terms(profile: PersonaProfile) -> Iterator[Mapping[str, str]]:
 def _figures(
     stage: str, manifest: Mapping[str, Any], summary: pd.DataFrame, is_ego: bool
 ) -> Iterator[tuple[str, Sequence[str]]]:
-    campaign, seed = Campaign.model_validate(manifest["campaign"], strict=False), manifest["stages"][stage]["seed"]
+    seed = manifest["stages"][stage]["seed"]
     rows = {row["arm"]: row for row in summary[summary["seed"] == seed].to_dict("records")}
-    for arm in plan(campaign, manifest["personas"], is_tuned(manifest)):
+    for arm in planned(manifest):
         if not isinstance(arm, AssessmentStage) or arm.seed != seed or arm.name not in rows:
             continue
         side = arm.ego if is_ego else arm.non_ego

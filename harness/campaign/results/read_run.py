@@ -11,11 +11,10 @@ import pandas as pd
 from pydantic import ConfigDict, Field, ValidationError
 from rich.console import Console
 
-from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import Stage, stage_id
 from harness.campaign.results.shown_work import doing
 from harness.campaign.storage.arm_tables import PLAYED, arm_tables
-from harness.campaign.storage.manifest import is_tuned
+from harness.campaign.storage.manifest import planned
 from harness.campaign.storage.run_folder import JUDGED, RunFolder
 from harness.config.campaign import Campaign
 from harness.config.toml_reading import Document
@@ -55,6 +54,11 @@ class ReadRun:
     reference_drivers: pd.DataFrame | None
     """None where no arm's failures are judged."""
 
+    @property
+    def done(self) -> set[str]:
+        """The stages that are done, by id."""
+        return {name for name, entry in self.manifest["stages"].items() if entry["status"] == "done"}
+
 
 def read_run(folder: RunFolder, console: Console) -> ReadRun:
     """Read a run. Tables of arms whose log or whose metrics have changed are made anew. Raises UsageError where files
@@ -74,7 +78,7 @@ def read_run(folder: RunFolder, console: Console) -> ReadRun:
     return ReadRun(
         manifest=manifest,
         campaign=campaign,
-        stages=plan(campaign, manifest["personas"], is_tuned(manifest)),
+        stages=planned(manifest),
         scene=scene,
         policies=policies,
         episodes=joined("episodes", [arm.episodes for arm in arms]),

@@ -37,7 +37,7 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     tables = evaluated(run)
     for name, table in csv_tables(run, tables).items():
         write_csv(table, folder.path / f"{name}.csv")
-    write_model_cards(folder, tables.manifest, run.policies, tables.summary)
+    write_model_cards(folder, tables.manifest, run.policies, tables.summary, tables.realism)
     tables = replace(tables, replays=_write_replays(folder, run.scene, tables.episodes, console))
     with doing(console, "writing the report"):
         games = recorded_games(tables.episodes, tables.arms, folder.traces_of_arm, run.scene)

@@ -10,7 +10,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, ValidationError, model_validator
 
-from harness.campaign.plan.stages import stage_id
+from harness.campaign.plan.plan import plan
+from harness.campaign.plan.stages import Stage, stage_id
 from harness.campaign.storage.checksums import digest_of
 from harness.config.campaign import Campaign, CampaignName, Seed
 from harness.config.persona import Persona
@@ -123,6 +124,13 @@ def read_manifest(file: Path, content: bytes) -> dict[str, Any]:
 def checksum_of_content(manifest: Mapping[str, Any]) -> str:
     """SHA-256 of what a manifest holds beside its key `sha256`, which states it."""
     return digest_of({key: value for key, value in manifest.items() if key != "sha256"})
+
+
+def planned(manifest: Mapping[str, Any]) -> list[Stage]:
+    """Every stage of the plan of a run, each after those it needs."""
+    campaign = Campaign.model_validate(manifest["campaign"], strict=False)
+    lapsing = [name for name, document in manifest["persona_documents"].items() if document.get("attention")]
+    return plan(campaign, manifest["personas"], is_tuned(manifest), lapsing)
 
 
 def is_tuned(manifest: Mapping[str, Any]) -> bool:

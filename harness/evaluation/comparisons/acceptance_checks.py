@@ -81,7 +81,7 @@ class Evidence:
         return {(row["arm"], row["seed"]): row for row in self.summary.to_dict("records")}
 
     def unanswered(self, persona: str, seed: int) -> bool:
-        """Whether a question is not answered, because a player can't drive the scene: its row states a reason."""
+        """Whether a question is not answered: its row states a reason."""
         asked = (self.comparisons["persona"] == persona) & (self.comparisons["seed"] == seed)
         return bool((asked & (self.comparisons["reason"] != "")).any())
 
@@ -105,7 +105,7 @@ def judge(
     """Every bound for every persona and training seed: one check for each arm that it is measured in.
 
     `bounds` are those of docs/acceptance.md with their values. A bound that can't be measured has a check with NaN,
-    which does not pass; so has every bound about players of which one can't drive the scene.
+    which does not pass; so has every bound about players of which a question is not answered.
     """
     checks = []
     for name, allowed in bounds.items():

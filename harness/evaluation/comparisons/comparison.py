@@ -17,8 +17,9 @@ one-tailed in the direction of H1 like the t-test (of the pairs in which exactly
 in more than half? Binomial with p = 1/2; 1 when there are no such pairs); and Holm's correction over all
 t-tests of the table, which is that of the whole campaign.
 
-A question whose players were not shown to drive the scene alone (`competence.gate`) is not answered: its rows have
-pairs and a mean difference, which describe the games, and no test. They are not in Holm's family.
+A question whose players were not shown to drive the scene alone, or whose person does not drive as people do
+(`competence.gate_of`), is not answered: its rows have pairs and a mean difference, which describe the games, and no
+test. They are not in Holm's family.
 
 `rejects_h0` is the paper's criterion, the uncorrected p-value. The verdict is stricter: see `Verdict`.
 """
@@ -33,7 +34,7 @@ import pandas as pd
 import scipy  # loads `scipy.stats` at its first use: workers do without
 
 from harness.evaluation.columns import TABLES
-from harness.evaluation.competence import Question, ResearchQuestion, Verdict, gate
+from harness.evaluation.competence import Question, ResearchQuestion, Verdict, gate_of
 from harness.evaluation.tables import typed
 from harness.game.arrays import FloatArray
 
@@ -57,16 +58,12 @@ def compare(questions: Iterable[Question], episodes: pd.DataFrame, significance:
     game errored, has an empty value, or is missing. A value that can't be computed is NaN. Where all
     differences are equal, or there are fewer than two pairs, there is no test: t, p-values, interval and effect
     size are NaN, the row is not in Holm's family, and `rejects_h0` is false. The same holds for a question whose
-    players miss a bound of `Question.alone`.
+    players miss a bound of `Question.alone`, or whose person is unlike people.
 
     Raises ValueError when an arm has two games for one episode.
     """
     games = games_by_arm(episodes)
-    rows = [
-        _row(question, metric, games, gate(question.alone, question.seed, games))
-        for question in questions
-        for metric in METRICS
-    ]
+    rows = [_row(question, metric, games, gate_of(question, games)) for question in questions for metric in METRICS]
     table = pd.DataFrame(rows, columns=list(TABLES["comparisons"]))
     table["rejects_h0"] = table["p_value"].astype("float64") < significance
     return typed(with_verdicts(table, significance))

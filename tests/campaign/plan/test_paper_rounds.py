@@ -56,6 +56,14 @@ def test_plan__pairings_of_a_learned_ego() -> None:
     }
 
 
+def test_plan__a_persona_with_lapses_is_also_assessed_alone_with_its_eyes_on_the_road() -> None:
+    stages, without = stages_of("anna", "bert", lapsing=["anna"]), stages_of("anna", "bert")
+    assert stages.keys() - without.keys() == {"anna_attentive_alone"}
+    arm = stages["anna_attentive_alone"]
+    assert arm.sides == ((), (Trained(stage="anna-seed1", persona="anna", attentive=True),))
+    assert stages["anna_alone"].non_ego == (Trained(stage="anna-seed1", persona="anna"),)
+
+
 @pytest.mark.parametrize("warm", [False, True])
 def test_plan__trainings_of_a_learned_ego(warm: bool) -> None:
     shares = {"non_ego_training": {"alone_share": 0.125}, "retraining": {"alone_share": 0.5, "warm_start": warm}}
@@ -144,6 +152,13 @@ def test_keys__a_persona_changes_what_it_takes_part_in(tmp_path: Path, personas:
     write_persona(tmp_path, "bert", goal=2.5)
     _, changed = planned(tmp_path, personas=personas)
     assert differing(keys, changed) == of_persona("bert")
+
+
+def test_keys__what_a_persona_declares_of_people_changes_no_game(tmp_path: Path, personas: list[str]) -> None:
+    _, keys = planned(tmp_path, personas=personas)
+    declared = '[[unlike_people]]\nfigure = "max_jerk_mps3"\nreason = "It is the driver of a paper."\n'
+    Path(personas[1]).write_text(f"{Path(personas[1]).read_text()}{declared}")
+    assert planned(tmp_path, personas=personas)[1] == keys
 
 
 @pytest.mark.parametrize(

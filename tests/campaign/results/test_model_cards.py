@@ -15,7 +15,8 @@ from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.evaluation.columns import TABLES
 from harness.evaluation.competence import DID_NOT_LEARN
-from harness.evaluation.tables import read_csv, typed
+from harness.evaluation.realism import CRASHES
+from harness.evaluation.tables import read_csv, table_of, typed
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import learned_run, sumo_run
 
@@ -84,6 +85,9 @@ SUMMARY = typed(
     )
 )
 
+CRASHES_OF_DISTRACTED = {"player": "distracted", "seed": 1, "figure": CRASHES, "games": 100}
+REALISM = table_of("realism", [{**CRASHES_OF_DISTRACTED, "value": 1_460_064.0, "low": 777_423.0, "high": 2_496_755.0}])
+
 
 def lines(card: str) -> list[str]:
     return card.replace("\N{NO-BREAK SPACE}", " ").splitlines()
@@ -93,7 +97,7 @@ def case(stage: str, rows: str, person: dict[str, Any] | None = None, **policy: 
     """A card and rows that it has; `person` changes the careful persona of a non-ego, `policy` its policy.json."""
     documents = {"distracted": persona("distracted") if person is None else {**persona("careful"), **person}}
     made = {**(NON_EGO_POLICY if stage == "distracted-seed1" else POLICY), **policy}
-    card = "\n".join(lines(model_card(stage, {**MANIFEST, "persona_documents": documents}, SUMMARY, made)))
+    card = "\n".join(lines(model_card(stage, {**MANIFEST, "persona_documents": documents}, SUMMARY, REALISM, made)))
     return card, [row.strip() for row in rows.strip().splitlines()]
 
 
@@ -169,7 +173,7 @@ def test_card__states_its_facts(card: str, rows: list[str]) -> None:
 
 
 def test_card__figures_are_those_of_its_own_arms_and_seed() -> None:
-    card = lines(model_card("naive-seed1", MANIFEST, SUMMARY, POLICY))
+    card = lines(model_card("naive-seed1", MANIFEST, SUMMARY, REALISM, POLICY))
     start = card.index("| arm | games | failure rate | mean speed (m/s) |")
     assert card[start + 1 : start + 5] == [
         "| --- | ---: | ---: | ---: |",
@@ -179,20 +183,28 @@ def test_card__figures_are_those_of_its_own_arms_and_seed() -> None:
     ]
 
 
+def test_card__of_a_person_states_its_crashes_alone() -> None:
+    crashes = "Alone on the road: 1.46 crashes per km (95 %: 0.777–2.497)."
+    assert crashes in lines(model_card("distracted-seed1", MANIFEST, SUMMARY, REALISM, NON_EGO_POLICY))
+    unmeasured = table_of("realism", [{**CRASHES_OF_DISTRACTED, "value": None}])
+    assert "crashes per km" not in model_card("distracted-seed1", MANIFEST, SUMMARY, unmeasured, NON_EGO_POLICY)
+    assert "crashes per km" not in model_card("naive-seed1", MANIFEST, SUMMARY, REALISM, POLICY)
+
+
 def test_card__marks_a_quick_run_and_has_no_timings() -> None:
-    card = model_card("naive-seed1", MANIFEST, SUMMARY, POLICY)
+    card = model_card("naive-seed1", MANIFEST, SUMMARY, REALISM, POLICY)
     assert "not for conclusions" not in card
-    assert "not for conclusions" in model_card("naive-seed1", {**MANIFEST, "quick": True}, SUMMARY, POLICY)
+    assert "not for conclusions" in model_card("naive-seed1", {**MANIFEST, "quick": True}, SUMMARY, REALISM, POLICY)
     slower = json.loads(json.dumps(MANIFEST))
     slower["stages"]["naive-seed1"]["seconds"] = 999.0
-    assert model_card("naive-seed1", slower, SUMMARY, POLICY) == card
+    assert model_card("naive-seed1", slower, SUMMARY, REALISM, POLICY) == card
 
 
 def test_card__of_a_policy_that_did_not_learn_says_so_first() -> None:
     manifest = json.loads(json.dumps(MANIFEST))
     judgement = {"stopped": DID_NOT_LEARN, "goals": 3, "played": 100, "goal_share_asked": 0.97}
     manifest["stages"]["naive-seed1"] |= judgement
-    card = model_card("naive-seed1", manifest, SUMMARY, POLICY).replace("\N{NO-BREAK SPACE}", " ")
+    card = model_card("naive-seed1", manifest, SUMMARY, REALISM, POLICY).replace("\N{NO-BREAK SPACE}", " ")
     stopped = "did not learn: goal in 3 of 100 games alone, at least 97 % asked"
     assert f"**It {stopped}. Not for use.**" in card.partition("| player |")[0]
     assert f"| trained for | 1,703,936 of at most 3,000,000 steps: {stopped} |" in card.splitlines()
@@ -215,7 +227,9 @@ def test_run__has_a_card_beside_each_policy_with_arms_of_its_summary(run: Callab
 def test_card__a_description_is_one_line_of_text() -> None:
     description = "In a hurry.\n## Figures\n| failure rate | 0 % |\n<script>alert(1)</script>"
     documents = {"distracted": {**persona("distracted"), "description": description}}
-    card = lines(model_card("distracted-seed1", {**MANIFEST, "persona_documents": documents}, SUMMARY, NON_EGO_POLICY))
+    card = lines(
+        model_card("distracted-seed1", {**MANIFEST, "persona_documents": documents}, SUMMARY, REALISM, NON_EGO_POLICY)
+    )
     (line,) = [line for line in card if "In a hurry." in line]
     assert line.endswith("In a hurry. ## Figures \\| failure rate \\| 0 % \\| &lt;script>alert(1)&lt;/script>")
     assert [line for line in card if line.startswith("## Figures")] == ["## Figures"]
