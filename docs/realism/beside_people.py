@@ -13,7 +13,16 @@ from typing import Annotated
 
 import typer
 
-from harness.evaluation.realism import CRASH_SOURCE, CRASHES, OF_DRIVERS, OF_WALKERS, HumanFigure
+from harness.evaluation.realism import (
+    CRASH_ODDS,
+    CRASH_SOURCE,
+    CRASHES,
+    ODDS_SOURCE,
+    OF_DRIVERS,
+    OF_WALKERS,
+    Games,
+    HumanFigure,
+)
 from harness.evaluation.tables import read_csv
 from harness.reports.human_ranges import headline, human_rows, title_of
 
@@ -42,7 +51,9 @@ def ranges() -> None:
     for of, figures in (("drivers", OF_DRIVERS), ("people on foot", OF_WALKERS)):
         for each in figures:
             _print_row(title_of(each.name), of, each.games.value, _range(each), each.source or "none found")
-    _print_row(title_of(CRASHES), "all", "alone on the road", "outside if the interval is above 2.91", CRASH_SOURCE)
+    _print_row(title_of(CRASHES), "all", Games.ALONE.value, "outside if the interval is above 2.91", CRASH_SOURCE)
+    odds = "at least 1.8 and at most 7.2; outside if the interval is beside it"
+    _print_row(title_of(CRASH_ODDS), "persons with lapses", Games.ALONE.value, odds, ODDS_SOURCE)
 
 
 def _print_row(*cells: str) -> None:
