@@ -9,6 +9,8 @@ import pytest
 
 from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.competence import WITHHELD, Verdict
+from harness.evaluation.realism import CRASHES, DECLARED
+from harness.evaluation.tables import table_of
 from harness.evaluation.worst_first import worst_first
 from harness.replay.selection import choose_games, replay_name
 from harness.reports import page as page_module
@@ -164,6 +166,24 @@ def test_words__only_significant_is_a_yes(verdict, question, small):
     for text in (found.sentence, found.speed):
         if verdict in (Verdict.NO_DIFFERENCE, Verdict.ALL_EQUAL, Verdict.NOT_ENOUGH_PAIRS):
             assert "significantly" not in text
+
+
+def test_answer__of_a_person_that_declares_to_be_unlike_people_says_so(small):
+    cells = {"player": "speedy", "seed": 1, "figure": "lane_change_s", "games": 90, "realistic": DECLARED}
+    realism = table_of("realism", [{**cells, "value": 2.2, "people_low": 3.5, "people_high": 8.0}])
+    plain = answered("RQ1", small["comparisons"], small)
+    found = answered("RQ1", small["comparisons"], {**small, "realism": realism})
+    note = "The speedy driver is outside the range of people, as its persona declares:"
+    assert found.sentence == f"{plain.sentence} {note} lane change 2.2 s, people 3.5 to 8 s."
+    assert found.label == plain.label == "yes"
+
+
+def test_card__of_a_person_states_how_often_it_crashes_alone(small):
+    crashes = {"player": "speedy", "seed": 1, "figure": CRASHES, "games": 60}
+    crashes |= {"value": 1_460_064.0, "low": 777_423.0, "high": 2_496_755.0}
+    text = text_of({**small, "realism": table_of("realism", [crashes])}).replace("\N{NO-BREAK SPACE}", " ")
+    assert ", with 1.46 crashes per km (95 %: 0.777–2.497)." in text
+    assert "crashes per km" not in text_of(small)
 
 
 SPEEDS = {"mean_speed_mps": 13.5}
