@@ -87,7 +87,7 @@ OF_DRIVERS = (
         metric="max_deceleration_mps2",
         high=3.4,
         games=Games.ALONE,
-        source="comfortable for 90 % of drivers (AASHTO), on a road where nothing asks for more",
+        source="at stop signs no more for most drivers (Transportation Research Record 1937, 2005)",
     ),
     HumanFigure(
         metric="max_lateral_acceleration_mps2",

@@ -64,8 +64,9 @@ def test_clauses__of_a_person_name_figure_value_and_range() -> None:
     assert unlike_people(rows, "speedy", 2).endswith("people: lane change 9 s, people 3.5 to 8 s")
     known = table(DECLARED_CHANGE, {**RED, "realistic": INSIDE})
     assert unlike_people(known, "speedy", 1) == ""
-    declared = "The speedy driver is outside the range of people, as its persona declares: "
-    assert declared_unlike(known, "speedy", 1) == f"{declared}lane change 2.2 s, people 3.5 to 8 s."
+    declared = "The speedy driver is unlike people, as its persona declares: lane change."
+    assert declared_unlike(known, "speedy", 1) == declared
+    assert declared_unlike(rows, "speedy", 1) == ""
 
 
 def test_crashes_alone__are_per_kilometre_and_empty_where_they_were_not_measured() -> None:

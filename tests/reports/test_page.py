@@ -173,8 +173,8 @@ def test_answer__of_a_person_that_declares_to_be_unlike_people_says_so(small):
     realism = table_of("realism", [{**cells, "value": 2.2, "people_low": 3.5, "people_high": 8.0}])
     plain = answered("RQ1", small["comparisons"], small)
     found = answered("RQ1", small["comparisons"], {**small, "realism": realism})
-    note = "The speedy driver is outside the range of people, as its persona declares:"
-    assert found.sentence == f"{plain.sentence} {note} lane change 2.2 s, people 3.5 to 8 s."
+    note = "The speedy driver is unlike people, as its persona declares: lane change."
+    assert found.sentence == f"{plain.sentence} {note}"
     assert found.label == plain.label == "yes"
 
 
