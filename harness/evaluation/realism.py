@@ -80,9 +80,7 @@ OF_DRIVERS = (
         "DOT HS 812 485): the middle 90 % of the normal distribution with these shares",
     ),
     HumanFigure(metric="following_gap_s", low=1.0, source="1 to 2 s in rush hour, 1 s at least (US-101)"),
-    HumanFigure(
-        metric="accepted_gap_s", low=2.2, source="critical gap 2.2 s at roundabouts (UMass), 4.87 s for left turns"
-    ),
+    HumanFigure(metric="accepted_gap_s", source=""),
     HumanFigure(
         metric="max_deceleration_mps2",
         high=3.4,

@@ -63,7 +63,7 @@ def unlike_people(realism: pd.DataFrame, persona: str, seed: int) -> str:
 
 def declared_unlike(realism: pd.DataFrame, persona: str, seed: int) -> str:
     """The names of the figures that are outside as its persona declares, as a sentence. Empty if there is none."""
-    found = ", ".join(_words(row["figure"]) for row in _of_person(realism, persona, seed, DECLARED))
+    found = "; ".join(_words(row["figure"]) for row in _of_person(realism, persona, seed, DECLARED))
     return f"The {persona} driver is unlike people, as its persona declares: {found}." if found else ""
 
 

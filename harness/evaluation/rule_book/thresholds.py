@@ -22,8 +22,9 @@ LANE_CHANGE_M = 1.0
 own."""
 HARD_BRAKE_MPS2 = 4.0
 """Least deceleration. UN Regulation No. 157 (5.5.1): the largest deceleration of an automated car that stops
-without an emergency. Similar numbers: 3.4 m/s2, comfortable according to AASHTO, and 0.45 g = 4.4 m/s2, the threshold
-of naturalistic studies (Simons-Morton et al. 2012, Am. J. Epidemiology 175:1075)."""
+without an emergency. Similar numbers: 90 % of drivers brake harder than 3.4 m/s2 for what they do not expect
+(AASHTO), and 0.45 g = 4.4 m/s2, the threshold of naturalistic studies (Simons-Morton et al. 2012, Am. J. Epidemiology
+175:1075)."""
 HARD_BRAKE_LEAST_S = 0.3
 """Least duration: a shorter one is a touch of the pedal. Our own."""
 SWERVE_MPS2 = 2.0
