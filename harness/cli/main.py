@@ -28,7 +28,7 @@ def main() -> None:
         from harness.cli.app import run
 
         run()
-    except (KeyboardInterrupt, SystemExit):  # typer makes the one into the other
+    except BaseException:  # typer makes SystemExit of a KeyboardInterrupt, and __set_name__ RuntimeError
         if not received:
             raise
         print(CONTINUES if sys.argv[1:2] in _CONTINUED else INTERRUPTED, file=sys.stderr)

@@ -20,7 +20,7 @@ from harness.campaign.preflight import open_campaign
 from harness.campaign.storage.run_folder import RunFolder
 from harness.cli import messages
 from harness.cli.app import app
-from harness.cli.main import INTERRUPTED, main
+from harness.cli.main import CONTINUES, INTERRUPTED, main
 from harness.errors import FAILED, NOT_ACCEPTED, USAGE_ERROR, SimulationError
 from harness.evaluation.tables import read_csv
 from harness.evaluation.worst_first import FAILURES
@@ -208,6 +208,24 @@ def test_campaign__ended_while_it_loads_its_modules_says_that_it_continues(
     process.send_signal(number)
     assert_interrupted(process, code)
     assert not (tmp_path / "run").exists()
+
+
+def test_main__interrupted_while_a_class_is_made_prints_no_traceback(
+    run_command: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Attribute:
+        def __set_name__(self, owner: type, name: str) -> None:
+            signal.raise_signal(signal.SIGTERM)
+
+    def run() -> None:
+        type("Class", (), {"attribute": Attribute()})  # Python 3.11 raises RuntimeError for any error in it
+
+    monkeypatch.setattr("harness.cli.app.run", run)
+    before = signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    try:
+        assert run_command("campaign", "merge") == (143, "", f"{CONTINUES}\n")
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def caught_by(pid: int) -> int:
