@@ -28,11 +28,20 @@ def main() -> None:
         from harness.cli.app import run
 
         run()
-    except BaseException:  # typer makes SystemExit of a KeyboardInterrupt, and __set_name__ RuntimeError
-        if not received:
+    except BaseException as error:
+        if not (received and _ends_by_request(error)):
             raise
         print(CONTINUES if sys.argv[1:2] in _CONTINUED else INTERRUPTED, file=sys.stderr)
         sys.exit(128 + received[0])
+
+
+def _ends_by_request(error: BaseException | None) -> bool:
+    """Whether an error is a KeyboardInterrupt or was made of one. typer makes SystemExit of it, and a module that is
+    loaded can make any error of it: Python 3.11 makes RuntimeError where a class is defined. An error that occurs while
+    the command ends is no such error."""
+    return error is not None and (
+        isinstance(error, (KeyboardInterrupt, SystemExit)) or _ends_by_request(error.__cause__)
+    )
 
 
 if __name__ == "__main__":

@@ -210,22 +210,38 @@ def test_campaign__ended_while_it_loads_its_modules_says_that_it_continues(
     assert not (tmp_path / "run").exists()
 
 
+@pytest.fixture
+def signal_is_default() -> Iterator[None]:
+    """SIGTERM is handled by nobody, so that the command handles it; what handled it before does so again afterwards."""
+    before = signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGTERM, before)
+
+
 def test_main__interrupted_while_a_class_is_made_prints_no_traceback(
-    run_command: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
+    run_command: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, signal_is_default: None
 ) -> None:
     class Attribute:
         def __set_name__(self, owner: type, name: str) -> None:
             signal.raise_signal(signal.SIGTERM)
 
     def run() -> None:
-        type("Class", (), {"attribute": Attribute()})  # Python 3.11 raises RuntimeError for any error in it
+        type("Class", (), {"attribute": Attribute()})  # Python 3.11 makes RuntimeError of any error in __set_name__
 
     monkeypatch.setattr("harness.cli.app.run", run)
-    before = signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    try:
-        assert run_command("campaign", "merge") == (143, "", f"{CONTINUES}\n")
-    finally:
-        signal.signal(signal.SIGTERM, before)
+    assert run_command("campaign", "merge") == (143, "", f"{CONTINUES}\n")
+
+
+def test_main__an_error_while_it_ends_is_not_hidden(monkeypatch: pytest.MonkeyPatch, signal_is_default: None) -> None:
+    def run() -> None:
+        try:
+            signal.raise_signal(signal.SIGTERM)
+        finally:
+            raise ZeroDivisionError
+
+    monkeypatch.setattr("harness.cli.app.run", run)
+    with pytest.raises(ZeroDivisionError):
+        main()
 
 
 def caught_by(pid: int) -> int:
@@ -235,14 +251,10 @@ def caught_by(pid: int) -> int:
 
 
 def test_command__that_keeps_no_work_says_only_that_it_was_interrupted(
-    run_command: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
+    run_command: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, signal_is_default: None
 ) -> None:
-    before = signal.signal(signal.SIGTERM, signal.SIG_DFL)
     monkeypatch.setattr("harness.cli.documents.check_scene", lambda *_: signal.raise_signal(signal.SIGTERM))
-    try:
-        assert run_command("check", "networks/merge") == (143, "", f"{INTERRUPTED}\n")
-    finally:
-        signal.signal(signal.SIGTERM, before)
+    assert run_command("check", "networks/merge") == (143, "", f"{INTERRUPTED}\n")
 
 
 @pytest.mark.parametrize("arguments", [("campaign", "merge"), ("report", "nowhere")])
