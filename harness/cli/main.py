@@ -2,23 +2,36 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
-from typing import NoReturn
+import threading
+from types import FrameType
 
 INTERRUPTED = "Interrupted."
 CONTINUES = f"{INTERRUPTED} Finished work is kept: run the same command again to continue."
 _CONTINUED = (["campaign"], ["demo"])
+_IMPORTS = "<frozen importlib"  # begins the names of the files of Python's own import
+_AGAIN_S = 0.05
 
 
 def main() -> None:
     """The `harness` command. Ctrl-C, SIGTERM and SIGHUP end it with one message on standard error, and with 128 plus
-    the number of the signal as its exit code. A signal that is ignored, as by nohup, stays ignored."""
+    the number of the signal as its exit code. A signal that is ignored, as by nohup, stays ignored.
+
+    A signal that arrives during an import takes effect after it: modules make other errors of a KeyboardInterrupt, or
+    ignore it.
+    """
     received: list[int] = []
 
-    def interrupt(number: int, frame: object) -> NoReturn:
-        received.append(number)
-        raise KeyboardInterrupt
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        if _imports(frame):
+            again = threading.Timer(_AGAIN_S, os.kill, (os.getpid(), number))
+            again.daemon = True
+            again.start()
+        else:
+            received.append(number)
+            raise KeyboardInterrupt
 
     try:
         for name in ("SIGINT", "SIGTERM", "SIGHUP"):
@@ -28,20 +41,18 @@ def main() -> None:
         from harness.cli.app import run
 
         run()
-    except BaseException as error:
-        if not (received and _ends_by_request(error)):
+    except (KeyboardInterrupt, SystemExit):  # typer makes the one into the other
+        if not received:
             raise
         print(CONTINUES if sys.argv[1:2] in _CONTINUED else INTERRUPTED, file=sys.stderr)
         sys.exit(128 + received[0])
 
 
-def _ends_by_request(error: BaseException | None) -> bool:
-    """Whether an error is a KeyboardInterrupt or was made of one. typer makes SystemExit of it, and a module that is
-    loaded can make any error of it: Python 3.11 makes RuntimeError where a class is defined. An error that occurs while
-    the command ends is no such error."""
-    return error is not None and (
-        isinstance(error, (KeyboardInterrupt, SystemExit)) or _ends_by_request(error.__cause__)
-    )
+def _imports(frame: FrameType | None) -> bool:
+    """Whether a frame is that of an import, or of what an import runs."""
+    while frame is not None and not frame.f_code.co_filename.startswith(_IMPORTS):
+        frame = frame.f_back
+    return frame is not None
 
 
 if __name__ == "__main__":

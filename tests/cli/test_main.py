@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import re
 import resource
 import shutil
 import signal
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -218,15 +220,17 @@ def signal_is_default() -> Iterator[None]:
     signal.signal(signal.SIGTERM, before)
 
 
-def test_main__interrupted_while_a_class_is_made_prints_no_traceback(
-    run_command: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, signal_is_default: None
+def test_main__interrupted_during_an_import_ends_after_it(
+    run_command: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, signal_is_default: None, tmp_path: Path
 ) -> None:
-    class Attribute:
-        def __set_name__(self, owner: type, name: str) -> None:
-            signal.raise_signal(signal.SIGTERM)
+    (tmp_path / "loaded_late.py").write_text(
+        "import signal\ntry:\n    signal.raise_signal(signal.SIGTERM)\nexcept KeyboardInterrupt:\n    lost = True\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
 
     def run() -> None:
-        type("Class", (), {"attribute": Attribute()})  # Python 3.11 makes RuntimeError of any error in __set_name__
+        assert not hasattr(importlib.import_module("loaded_late"), "lost")
+        time.sleep(60.0)
 
     monkeypatch.setattr("harness.cli.app.run", run)
     assert run_command("campaign", "merge") == (143, "", f"{CONTINUES}\n")
