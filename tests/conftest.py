@@ -118,6 +118,6 @@ def moment() -> Callable[..., Quantities]:
         )
         routes, where = world.road.routes, (state.x_m, state.y_m)
         state.station_m, offset = routes.locate(*where, nearest_station_m(routes, *where))
-        return Quantities(world, state, bodies, np.zeros((1, len(players))), offset)
+        return Quantities(world, state, bodies, np.zeros((1, len(players))), offset, np.zeros((1, len(players))))
 
     return make

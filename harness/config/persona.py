@@ -151,52 +151,55 @@ _DelayS = Annotated[float, Field(ge=0.0, le=5.0)]
 
 
 class AttentionLapses(Document):
-    """When attention lapses, how long a lapse lasts, and how the car drifts in it."""
+    """When attention lapses, how long a lapse lasts, and what the car does in it."""
 
     mean_attentive_s: float = Field(gt=0.1, le=3600.0)
     """Mean time between lapses (exponential distribution)."""
     lapse_s: Annotated[tuple[Annotated[float, Field(gt=0.0)], float], AfterValidator(ordered)]
-    """Range of the length of a lapse (uniform distribution). In a lapse the policy's actions are omitted: pedals and
-    wheel are released."""
-    crown_steering_rad: float = Field(0.0, ge=0.0, le=0.1)
-    """Steering angle, to the right, that the crown of the road gives to a released wheel."""
+    """Range of the length of a lapse. In a lapse the policy's actions are omitted."""
+    lapse_distribution: Literal["uniform", "lognormal"] = "uniform"
+    """`uniform`: within the range. `lognormal`: the range holds the middle 90 % of the lapses."""
+    controls: Literal["released", "held"] = "released"
+    """What happens to pedals and wheel in a lapse. `released`: the car coasts with a straight wheel. `held`: the pedals
+    stay as they are, and the wheel follows the road, as in a glance at a telephone."""
     bump_steering_sd_rad: float = Field(0.0, ge=0.0, le=0.1)
-    """Standard deviation, from lapse to lapse, of the steering angle that bumps and the car's own pull add to it."""
+    """Standard deviation, from lapse to lapse, of the steering angle that bumps and the car's own pull give the
+    wheel."""
 
 
 class ReactionTime(Document):
-    """How late decisions reach pedals and wheel, in the training of the person as well."""
+    """How late the person knows what other players do, in the training of the person as well. Meanwhile it takes them
+    to keep their speed and heading."""
 
-    delay_s: Annotated[tuple[_DelayS, _DelayS], AfterValidator(ordered)]
-    """Range of the delay (uniform distribution, drawn for each drive), within 0 to 5 s. Until the first decision
-    arrives, the car coasts straight on."""
+    delay_s: Annotated[tuple[_DelayS, _DelayS], AfterValidator(ordered)] = (0.7, 1.5)
+    """Range of the delay (uniform distribution, drawn for each drive), within 0 to 5 s. By default from the brake
+    reaction to what is expected to that to a surprise (Green 2000)."""
 
 
 class Perception(Document):
-    """What a person fails to see. No blind-spot check, and looking but failing to see, are habits of driving, not of
+    """What a person sees of others, by their centres: directly within the field of view, and behind it in mirrors, or
+    on foot with a turn of the head. No shoulder glance, and looking but failing to see, are habits of driving, not of
     learning: they do not apply in the training of the person, because a car that is not seen and does no harm teaches
     nothing. How far and how exactly a person sees is a limit of the body, and applies in training as well."""
 
-    no_blind_spot_check_share: float = Field(0.0, ge=0.0, le=1.0)
-    """Share of the drives in which the person does not look into the mirrors and over the shoulder."""
-    unseen_behind_m: float = Field(0.0, ge=-20.0, le=100.0)
-    """In such a drive, a car is not seen if its centre is less than this far ahead of the centre of the person's own
-    car."""
+    no_shoulder_glance_share: float = Field(0.0, ge=0.0, le=1.0)
+    """Share of the drives in which the person does not glance over the shoulder: a car beside the own one is then not
+    seen between the field of view and the mirrors, within 3 m of the flank and back to 3 m behind the rear."""
     looked_but_failed_to_see_share: float = Field(0.0, ge=0.0, le=1.0)
     """Share of the drives in which the person looks but fails to see: other cars are noticed only when they are
     near."""
     noticed_within_m: float | None = Field(None, gt=0.0, le=100.0)
     """In such a drive, other cars are seen only within this distance, from centre to centre."""
-    range_m: float | None = Field(None, gt=0.0, le=100.0)
+    range_m: float = Field(100.0, gt=0.0, le=100.0)
     """Other cars farther away than this, from centre to centre, are never seen."""
-    opening_deg: float | None = Field(None, gt=0.0, le=360.0)
-    """Angle of view, ahead of the car and half of it to each side: other cars whose centre is outside it are never
-    seen. Left out: all around, as with mirrors."""
-    distance_error: float = Field(0.0, ge=0.0, le=1.0)
+    field_of_view_deg: float = Field(180.0, gt=0.0, le=360.0)
+    """Angle, ahead of the car and half of it to each side, within which the person sees directly."""
+    distance_error: float = Field(0.05, ge=0.0, le=1.0)
     """Error in the estimated distance of other cars: standard deviation of the logarithm of the factor, so 0.1 is about
-    10 %."""
-    closing_error_per_s: float = Field(0.0, ge=0.0, le=1.0)
-    """Error in the estimated closing speed of other cars: standard deviation, per distance. 0.01 is 0.3 m/s at 30 m."""
+    10 %. The default is that of Treiber, Kesting and Helbing (2006)."""
+    closing_error_per_s: float = Field(0.01, ge=0.0, le=1.0)
+    """Error in the estimated closing speed of other cars: standard deviation, per distance. 0.01 is 0.3 m/s at 30 m.
+    The default is that of Treiber, Kesting and Helbing (2006)."""
 
     @model_validator(mode="after")
     def _nothing_is_ignored(self) -> Perception:
@@ -232,8 +235,8 @@ class Persona(Document):
     operational: Group = Group()
     human: Human = Human()
     attention: AttentionLapses | None = None
-    perception: Perception | None = None
-    reaction: ReactionTime | None = None
+    perception: Perception = Perception()
+    reaction: ReactionTime = ReactionTime()
     actuators: CarUse | None = None
     decisions: Literal["mode", "sampled"] = "mode"
     """`mode`: always the most likely action of the policy. `sampled`: actions drawn from the policy's distribution."""

@@ -36,6 +36,14 @@ class Actuators(Document):
     """Distance between the axles."""
     max_lateral_mps2: float = Field(15.0, gt=0.0, le=15.0)
     """Lateral acceleration at the greatest lean of a two-wheeler. At the default, grip alone limits it."""
+    throttle_lag_s: float = Field(0.5, ge=0.0, le=2.0)
+    """Time constant with which the acceleration follows the throttle."""
+    brake_lag_s: float = Field(0.2, ge=0.0, le=2.0)
+    """Time constant with which the deceleration follows the brake."""
+    steering_lag_s: float = Field(0.11, ge=0.0, le=2.0)
+    """Time constant with which the road wheel angle follows the hands."""
+    max_jerk_mps3: float = Field(12.65, gt=0.0, le=100.0)
+    """Greatest change of the acceleration along the heading per second."""
 
     def with_defaults_of(self, kind: Kind) -> Actuators:
         """These limits; those that the document does not give are the kind's."""
@@ -66,6 +74,9 @@ DEFAULTS: Mapping[str, Actuators] = {
         max_steering_rate_radps=10.0,
         wheelbase_m=0.6,
         max_lateral_mps2=3.0,
+        throttle_lag_s=0.0,
+        brake_lag_s=0.0,
+        steering_lag_s=0.0,
     ),
 }
 """The limits of each kind.
@@ -76,4 +87,9 @@ is SUMO 1.28's default of vClass `bicycle`. Pedestrian: acceleration from a stan
 deviation of 0.09 g (Randles et al., SAE 2010-01-0070): the limit is the sum of the two. The others are chosen here.
 Steering rate of bicycles and e-scooters: at 5 m/s the rider leans from upright to the limit in about 0.25 s. With
 2 rad/s, an exploring learner leaves its lane within 4 s, and no policy was learned.
+
+Throttle: 0.5 s is usual for the lag of a car's acceleration (Rajamani, Vehicle Dynamics and Control, 2nd ed.,
+chapter 6). Steering: 0.11 s is the neuromuscular lag of usual models of drivers (e.g. Chinese Journal of Mechanical
+Engineering 33, 2020, article 61, table 1). Jerk: the careful and competent driver of UN R157 reaches 0.774 g within
+0.6 s. The lag of the brake is chosen here. People on foot change their speed at once.
 """

@@ -92,8 +92,8 @@ class NaiveTraining(Document):
 class NonEgoTraining(Document):
     """Training of the non-ego in round 1."""
 
-    alone_share: float = Field(0.7, ge=0.0, le=1.0)
-    """Share of games without the ego: people mostly learn to drive on roads with no car beside them."""
+    alone_share: float = Field(0.5, ge=0.0, le=1.0)
+    """Share of games without the ego: people learn to drive on empty roads as well."""
 
 
 class Retraining(Document):

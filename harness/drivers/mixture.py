@@ -47,8 +47,10 @@ def mixture_of(driver: Driver, persona: Persona) -> Mixture:
 
 
 def factors_of(player: Mixture | None) -> list[HumanFactors]:
-    """The human factors of a player's drivers; none where no one drives."""
-    return [HumanFactors()] if player is None else [each.persona.human_factors for each in player.members]
+    """The human factors of a player's drivers; none where no one drives, or SUMO."""
+    if player is None or not player.takes_over:
+        return [HumanFactors()]
+    return [each.persona.human_factors for each in player.members]
 
 
 def shares_of(player: Mixture | None) -> list[float]:

@@ -9,7 +9,7 @@ The random numbers of a game are drawn when it is reset (`game.initial_state`). 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NoReturn
 
 import numpy as np
@@ -21,11 +21,13 @@ from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.bicycle import Requested, move, requests
 from harness.game.human_factors import PlayersLimits, release_controls
 from harness.game.initial_state import InitialState
+from harness.game.memory import Memory
 from harness.game.observation import observe
 from harness.game.observation_layout import SIZE
 from harness.game.outcome import Outcome
 from harness.game.quantities import Quantities
 from harness.game.sanity_checks import check_observation, check_step, checked_decisions
+from harness.game.sliding import along_rail, slide
 from harness.game.state import State, terminations
 from harness.game.traffic_rules import since_change_s
 from harness.game.walking import walk
@@ -46,7 +48,9 @@ class LiveSimulation:
         )
 
 
-_RUNNING, _GOAL = int(Outcome.RUNNING), int(Outcome.GOAL)  # comparing arrays with members of an enumeration is slower
+# comparing arrays with members of an enumeration is slower
+_RUNNING, _GOAL, _RAIL = int(Outcome.RUNNING), int(Outcome.GOAL), int(Outcome.RAIL)
+_COLLISION = int(Outcome.COLLISION)
 
 
 @dataclass(kw_only=True)
@@ -104,6 +108,9 @@ class Arena(LiveSimulation):
         self._noise = np.zeros((games, players, self.world.steps if self._has_drivers else 0, 2))
         self._lapsed = np.zeros((games, players, self.world.steps), dtype=bool)
         self._lapsed_steering_rad = np.zeros((games, players, self.world.steps))
+        self._held = np.zeros((games, players), dtype=bool)
+        self._course_rad: FloatArray = np.zeros((games, players))  # of players that slide
+        self._memory = Memory(games, players, self.world.step_s)
         self._limits = PlayersLimits(games, players, self.world.steps)
         self._road_steering_rad: FloatArray = np.zeros((games, players))
         self._all_games = np.arange(games)
@@ -129,6 +136,7 @@ class Arena(LiveSimulation):
         for _, seat, plays in self._seats_in(np.ones(self.state.present.shape, dtype=bool)):
             if seat.driver is not None:
                 seat.driver.reset(games[plays[games]])
+        self._memory.begin(self.state)
         quantities = self.first_quantities(games)
         observation = self.observation[games] = observe(quantities)
         self._road_steering_rad[games] = quantities.along.road_steering_rad
@@ -153,6 +161,9 @@ class Arena(LiveSimulation):
         move(state, requested, world.actuators, world.step_s)
         if world.on_foot:
             walk(state, requested._replace(moving=drove & world.walks), world.actuators, world.step_s)
+        sliding = self._sliding(drove)
+        if sliding.any():
+            slide(state, sliding, self._course_rad, world.step_s)
         reading = self.reading = self.simulation.step(state.x_m, state.y_m, state.heading_rad)
         if reading.signals is not None:
             state.signal_s = since_change_s(before.signals, reading.signals, before.signal_s, world.step_s)
@@ -160,7 +171,7 @@ class Arena(LiveSimulation):
             self.signal_texts = list(reading.signal_texts or self.signal_texts)
         read_sumo_players(state, reading, drove=drove, taken_over=self._taken_over, step_s=world.step_s)
         state.station_m, offset_m = world.road.routes.locate(state.x_m, state.y_m, before.station_m)
-        quantities = self._quantities(state, state.station_m - before.station_m, offset_m)
+        quantities = self._quantities(state, before, offset_m)
         state.step = state.step + 1
         if self._limits.misjudges:
             self._limits.look(state)
@@ -168,7 +179,7 @@ class Arena(LiveSimulation):
         terminations(state.outcome, drove, (self._taken_over, state.step >= world.steps), distances_m)
         payoff = self._payoffs(quantities, drove)
         check_step(before, quantities, drove=drove, payoff=payoff, taken_over=self._taken_over)
-        self._finish(quantities, drove)
+        self._finish(quantities, drove, sliding)
         check_observation(self.observation, self._all_games, state.step)
         return Step(payoff=payoff, drove=drove, quantities=quantities)
 
@@ -191,13 +202,12 @@ class Arena(LiveSimulation):
                 decided = seat.driver.decide(games, self.observation[games, player], noise)
                 of = f"{self.world.roles[player]}, {type(seat.driver).__name__},"
                 chosen[games, player] = checked_decisions(decided, of, games, state.step)
-        if self._limits.delays:
-            chosen = self._limits.arriving(chosen, now)
         acceleration, steering = requests(chosen, state.speed_mps, self._road_steering_rad, self.world.actuators)
         if self._limits.spares:
             acceleration, steering = self._limits.within(acceleration, steering)
-        lapses = (self._lapsed, self._lapsed_steering_rad)
-        state.lapsed = release_controls((acceleration, steering), lapses, now, drove)
+        lapses = (self._lapsed, self._held, self._lapsed_steering_rad)
+        present = (state.acceleration_mps2, self._road_steering_rad)
+        state.lapsed = release_controls((acceleration, steering), present, lapses, now, drove)
         return acceleration, steering
 
     def _payoffs(self, quantities: Quantities, drove: BoolArray) -> FloatArray:
@@ -214,12 +224,17 @@ class Arena(LiveSimulation):
                 own = plays[:, player]
                 yield player, seat, own if len(seats) == 1 else own & (self._member[:, player] == member)
 
-    def _finish(self, quantities: Quantities, drove: BoolArray) -> None:
-        """Remove players that reached their goal, stop those that crashed, and observe."""
+    def _sliding(self, drove: BoolArray) -> BoolArray:
+        """[G, P] players that have crashed and still move."""
+        crashed = (self.state.outcome == _COLLISION) | (self.state.outcome == _RAIL)
+        return crashed & ~drove & self._on_wheels & self.state.present & (self.state.speed_mps > 0.0)
+
+    def _finish(self, quantities: Quantities, drove: BoolArray, sliding: BoolArray) -> None:
+        """Remove players that reached their goal, let those that crashed slide, and observe."""
         outcome = self.state.outcome
         ended = drove & (outcome != _RUNNING)
-        if not ended.any():
-            self._observe(quantities)
+        if not ended.any() and not sliding.any():
+            self._remember_and_observe(quantities)
             return
         for (game, player), reached in zip(np.argwhere(ended).tolist(), outcome[ended].tolist(), strict=True):
             if reached == _GOAL:
@@ -228,15 +243,25 @@ class Arena(LiveSimulation):
                 self.simulation.halt(game, player)
         state = self.state = self.state.copy()  # `quantities` refers to the old state
         state.present &= ~(ended & (outcome == _GOAL))
-        state.speed_mps[ended] = 0.0
+        slides = ended & self._on_wheels & (outcome != _GOAL) & (state.step[:, None] < self.world.steps)
+        self._course_rad = np.where(slides, state.heading_rad, self._course_rad)
+        at_rail = (slides | sliding) & (quantities.rail_clearance_m <= 0.0)
+        if at_rail.any():
+            self._course_rad = along_rail(state, at_rail, self._course_rad, self.world.road.routes)
+        state.speed_mps[ended & ~slides] = 0.0
         state.acceleration_mps2[ended] = 0.0
         state.lapsed[ended] = False
         # Positions are unchanged: only speeds are, and which players are present.
-        self._observe(self._quantities(state, quantities.advanced_m, quantities.lateral_offset_m))
+        bodies = self.nearby.of(state, self.reading)
+        self._remember_and_observe(replace(quantities, state=state, bodies=bodies))
 
-    def _observe(self, quantities: Quantities) -> None:
+    def _remember_and_observe(self, quantities: Quantities) -> None:
         """Observe, and keep what the next decisions need: the steering that follows the road."""
-        self.observation, self._road_steering_rad = observe(quantities), quantities.along.road_steering_rad
+        self._memory.remember(self.state)
+        self._road_steering_rad, perceived = quantities.along.road_steering_rad, None
+        if self._limits.delays:
+            perceived = self._memory.perceived(quantities.bodies, self._limits.lags(self.state.step))
+        self.observation = observe(quantities, perceived)
 
     # --- observations ------------------------------------------------------------------------------------
 
@@ -247,13 +272,14 @@ class Arena(LiveSimulation):
         state.station_m[game] = start.station_m
         state.friction[game], state.limit_share[game] = start.friction, start.limit_share
         state.acceleration_mps2[game] = state.steering_rad[game] = 0.0
-        state.unseen_behind_m[game], self._member[game] = start.unseen_behind_m, start.member
+        state.shoulder_glance[game], self._member[game] = start.shoulder_glance, start.member
         state.outcome[game], state.lapsed[game], state.step[game] = _RUNNING, False, 0
         self.nearby.place(game, start)
         for player in range(len(self.seats)):
             self._lapsed[game, player] = start.lapses[player].lapsed
             self._lapsed_steering_rad[game, player] = start.lapses[player].steering_rad
-            self._limits.reset(game, player, start.limits[player], state)
+            self._held[game, player] = start.lapses[player].held
+            self._limits.reset(game, player, start.limits[player], start.lapses[player], state)
         if self._has_drivers:
             self._noise[game] = start.noise
 
@@ -262,15 +288,19 @@ class Arena(LiveSimulation):
         state, routes = self.state.of(games), self.world.road.routes
         state.station_m, offset_m = routes.locate(state.x_m, state.y_m, state.station_m)
         self.state.station_m[games] = state.station_m
-        return self._quantities(state, np.zeros(offset_m.shape), offset_m, games)
+        return self._quantities(state, state, offset_m, games)
 
     def _quantities(
-        self, state: State, advanced_m: FloatArray, offset_m: FloatArray, games: IntArray | slice = slice(None)
+        self, state: State, before: State, offset_m: FloatArray, games: IntArray | slice = slice(None)
     ) -> Quantities:
-        """Quantities of `games`, whose players have this state, advance along their routes and lateral offset."""
-        bodies = self.nearby.of(state, self.reading, games)
+        """Quantities of `games`, whose players have this state, the one before, and a lateral offset."""
         return Quantities(
-            world=self.world, state=state, bodies=bodies, advanced_m=advanced_m, lateral_offset_m=offset_m
+            world=self.world,
+            state=state,
+            bodies=self.nearby.of(state, self.reading, games),
+            advanced_m=state.station_m - before.station_m,
+            lateral_offset_m=offset_m,
+            gained_mps2=state.acceleration_mps2 - before.acceleration_mps2,
         )
 
 

@@ -15,7 +15,8 @@ from harness.game.arrays import FloatArray
 
 FOLLOWS_S = 3.0
 """Largest gap over own speed at which a player follows its leader."""
-_FOLLOWS_LEAST_S = 1.0  # of following, in all
+_FOLLOWS_LEAST_S = 15.0
+"""From this time on behind the same vehicle a player follows it: a usual criterion of studies."""
 _MOVING_MPS = 5.0
 _BEGUN, _ENDED = 0.05, 0.95  # of the way from lane to lane
 _KEEPS_LEAST_S = 2.0  # of lane keeping, in all
@@ -80,26 +81,35 @@ def lateral_wander_m(drive: Drive) -> float | None:
     return finite((place_m - centre_m)[keeps], np.std)
 
 
-@metric("conduct", meaning=f"Median gap over own speed while following: a leader within {FOLLOWS_S:g} s.")
+@metric(
+    "conduct",
+    meaning=f"Median gap over own speed while following: behind the same vehicle, within {FOLLOWS_S:g} s, for more than "
+    f"{_FOLLOWS_LEAST_S:g} s.",
+)
 def following_gap_s(drive: Drive) -> float | None:
-    follows = (drive.of("time_gap_s") <= FOLLOWS_S) & (drive.of("speed_mps") >= _MOVING_MPS)
-    if follows.sum() * drive.step_s < _FOLLOWS_LEAST_S:
-        return None
-    return finite(drive.of("time_gap_s")[follows], np.median)
+    gaps_s = drive.of("time_gap_s")
+    behind = (gaps_s <= FOLLOWS_S) & (drive.of("speed_mps") >= _MOVING_MPS)
+    leader = np.where(behind, drive.of("leader"), -1)
+    since = np.arange(len(leader)) - np.maximum.accumulate(
+        np.where(np.diff(leader, prepend=-1), np.arange(len(leader)), 0)
+    )
+    follows = behind & (since * drive.step_s > _FOLLOWS_LEAST_S)
+    return finite(gaps_s[follows], np.median)
 
 
 @metric(
     "conduct",
-    meaning=f"Mean of speed minus speed limit where no leader is within {FOLLOWS_S:g} s; below 0 under the limit.",
+    meaning=f"Mean of speed minus speed limit where no leader is within {FOLLOWS_S:g} s, and no bend, signal, sign or "
+    "priority ahead asks for less than the limit; below 0 under the limit.",
 )
 def free_over_limit_mps(drive: Drive) -> float | None:
-    free = drive.of("time_gap_s") > FOLLOWS_S
+    free = (drive.of("time_gap_s") > FOLLOWS_S) & (drive.of("due_mps") >= drive.of("speed_limit_mps"))
     return finite((drive.of("speed_mps") - drive.of("speed_limit_mps"))[free], np.mean)
 
 
-@metric("conduct", meaning="Greatest change of the acceleration along the heading per second.")
+@metric("conduct", meaning="Greatest change of the acceleration along the heading per second, while it moves.")
 def max_jerk_mps3(drive: Drive) -> float | None:
-    return finite(np.abs(np.diff(drive.acceleration_mps2)) / drive.step_s, np.max)
+    return finite(np.abs(drive.of("jerk_mps3"))[drive.of("speed_mps") > 0.0], np.max)
 
 
 @metric(

@@ -114,6 +114,7 @@ OF_DRIVERS = (
     HumanFigure(metric="looks_away_share", games=Games.ALONE, source=""),
     HumanFigure(metric="longest_lapse_s", games=Games.ALONE, source=""),
 )
+_ROUNDING = 1e-6  # of a figure that a limit of the body holds exactly
 OF_WALKERS = (HumanFigure(metric="accepted_gap_s", low=3.0, source="3 s at least (DiPietro and King 1970)"),)
 CRASHES = "crashes_per_million_km"
 CRASH_SOURCE = "2.91 crashed vehicles per million km (arXiv 2312.12675v3)"
@@ -190,7 +191,8 @@ def _compared(figure: HumanFigure, games: pd.DataFrame) -> dict[str, object]:
     if not few:
         value = float(np.median(values) if figure.at_most is None else np.mean(values <= figure.at_most))
     comparable = not few and figure.source != ""
-    verdict = (INSIDE if figure.low <= value <= figure.high else OUTSIDE) if comparable else NOT_COMPARABLE
+    inside = figure.low - _ROUNDING <= value <= figure.high + _ROUNDING
+    verdict = (INSIDE if inside else OUTSIDE) if comparable else NOT_COMPARABLE
     spread = (math.nan, math.nan) if few else np.quantile(values, (_TAIL, 1.0 - _TAIL))
     return {
         "figure": figure.name,

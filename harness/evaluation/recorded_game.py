@@ -123,7 +123,8 @@ class RecordedGame:
         before_m = np.concatenate((state.station_m[:1], state.station_m[:-1]))
         state.station_m, offset_m = routes.locate(state.x_m, state.y_m, before_m)
         bodies = self.bodies._replace(present=self.bodies.present & self._considered)
-        return Quantities(self.world, state, bodies, state.station_m - before_m, offset_m)
+        gained_mps2 = np.diff(state.acceleration_mps2, axis=0, prepend=state.acceleration_mps2[:1])
+        return Quantities(self.world, state, bodies, state.station_m - before_m, offset_m, gained_mps2)
 
     @cached_property
     def _considered(self) -> BoolArray:
@@ -142,7 +143,7 @@ class RecordedGame:
     def encounters(self) -> tuple[tuple[Encounter, ...], ...]:
         """[P] the encounters of each player with other road users at junctions, near or far."""
         q = self.quantities
-        everyone = Quantities(q.world, q.state, self.bodies, q.advanced_m, q.lateral_offset_m)
+        everyone = Quantities(q.world, q.state, self.bodies, q.advanced_m, q.lateral_offset_m, q.gained_mps2)
         return tuple(tuple(encounters_of(everyone, player, drove)) for player, drove in enumerate(self.drove.T))
 
     def while_driving(self, values: NDArray, player: int) -> NDArray:

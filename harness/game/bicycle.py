@@ -7,6 +7,9 @@ Kinematic bicycle about the centre of the wheelbase (Rajamani, Vehicle Dynamics 
 
 Integration follows SUMO's Euler update (displacement = new speed times step), with the heading at mid-step. The lateral
 acceleration of a two-wheeler is also limited by its lean.
+
+Pedals and wheel act late: acceleration and steering angle approach what is requested with a first-order lag, the
+acceleration by no more than the limit of its jerk (`config.road_user` has the values and their sources).
 """
 
 from __future__ import annotations
@@ -34,6 +37,10 @@ class ActuatorLimits(NamedTuple):
     max_steering_rate_radps: FloatArray
     wheelbase_m: FloatArray
     max_lateral_mps2: FloatArray  # by the lean of a two-wheeler; a car is limited by its grip alone
+    throttle_lag_s: FloatArray  # time constants of the approach to what is requested
+    brake_lag_s: FloatArray
+    steering_lag_s: FloatArray
+    max_jerk_mps3: FloatArray
     friction: float
 
 
@@ -100,8 +107,9 @@ class Requested(NamedTuple):
 def move(state: State, requested: Requested, actuators: ActuatorLimits, step_s: float) -> None:
     """Move the players marked in `moving` by one step, in place.
 
-    The steering angle follows its request at the rate of the steering rack. The grip used by the curve is not available
-    to the pedals (friction circle). If the grip is too small for the curve, the car runs wide.
+    The steering angle follows its request with the lag of the steering, at most at the rate of the rack, and the
+    acceleration with the lag of the pedal that is used, at most at the limit of the jerk. The grip used by the curve is
+    not available to the pedals (friction circle). If the grip is too small for the curve, the car runs wide.
     """
     _move((motion_of(state), state.friction), tuple(requested), tuple(actuators), step_s)
 
@@ -114,7 +122,8 @@ def _move(cars: tuple[Any, ...], requests: tuple[Any, ...], limits: tuple[Any, .
         if requested.moving[g, p]:
             grip = friction[g] * GRAVITY_MPS2
             rack = actuators.max_steering_rate_radps[p] * step_s
-            turn = _clamped(requested.steering_rad[g, p] - steering_rad[g, p], rack)
+            followed = _followed_share(step_s, actuators.steering_lag_s[p])
+            turn = _clamped(followed * (requested.steering_rad[g, p] - steering_rad[g, p]), rack)
             steering = _clamped(steering_rad[g, p] + turn, actuators.max_steering_rad[p])
             requested_curvature = curvature_per_m(steering, actuators.wheelbase_m[p])
 
@@ -122,7 +131,11 @@ def _move(cars: tuple[Any, ...], requests: tuple[Any, ...], limits: tuple[Any, .
             pedal_grip = _remaining_grip(grip, requested_curvature * before**2)
             most_up = min(actuators.max_acceleration_mps2[p], pedal_grip)
             most_down = min(actuators.max_braking_mps2[p], pedal_grip)
-            acceleration = min(max(requested.acceleration_mps2[g, p], -most_down), most_up)
+            asked = requested.acceleration_mps2[g, p]
+            lag_s = actuators.brake_lag_s[p] if asked < 0.0 else actuators.throttle_lag_s[p]
+            change = _followed_share(step_s, lag_s) * (asked - acceleration_mps2[g, p])
+            change = _clamped(change, actuators.max_jerk_mps3[p] * step_s)
+            acceleration = min(max(acceleration_mps2[g, p] + change, -most_down), most_up)
             speed = min(max(before + acceleration * step_s, 0.0), actuators.max_speed_mps[p])
             acceleration = (speed - before) / step_s
 
@@ -135,6 +148,12 @@ def _move(cars: tuple[Any, ...], requests: tuple[Any, ...], limits: tuple[Any, .
             y_m[g, p] += speed * step_s * np.sin(course)
             heading_rad[g, p] = (heading_rad[g, p] + turned + np.pi) % (2.0 * np.pi) - np.pi
             acceleration_mps2[g, p], speed_mps[g, p], steering_rad[g, p] = acceleration, speed, steering
+
+
+@compiled
+def _followed_share(step_s: float, lag_s: float) -> float:
+    """The share of a request that a first-order lag follows within a step."""
+    return 1.0 - np.exp(-step_s / lag_s) if lag_s > 0.0 else 1.0
 
 
 @compiled

@@ -21,9 +21,10 @@ from harness.game.human_factors import (
     Limits,
     Reaction,
     Sight,
+    autocorrelated,
     draw_estimation_errors,
     draw_lapses,
-    unseen_behind_m,
+    glances_over_shoulder,
 )
 from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles
 from harness.game.road import Routes
@@ -33,16 +34,23 @@ from harness.game.start_range import StartRange, draw_along_route
 _UNLIMITED = (Reaction(), Sight(), ActuatorShares())
 
 
-class LazyNoise:
-    """Standard normal numbers, drawn on first use. They are the last draws of their generator."""
+HAND_PERSISTENCE_S = 0.5
+"""Correlation time of random decisions: a hand does not jump from step to step. Chosen here."""
 
-    def __init__(self, generator: np.random.Generator, shape: tuple[int, ...]) -> None:
-        self._generator, self._shape = generator, shape
+
+class LazyNoise:
+    """Standard normal numbers [P, T, 2], drawn on first use, correlated in time. They are the last draws of their
+    generator."""
+
+    def __init__(self, generator: np.random.Generator, shape: tuple[int, int, int], step_s: float) -> None:
+        self._generator, self._shape, self._step_s = generator, shape, step_s
 
     @cached_property
     def values(self) -> FloatArray:
         """The numbers, in the shape given."""
-        return self._generator.standard_normal(self._shape)
+        noise = self._generator.standard_normal(self._shape)
+        correlation = float(np.exp(-self._step_s / HAND_PERSISTENCE_S))
+        return np.stack([autocorrelated(of_player, correlation) for of_player in noise])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +66,7 @@ class InitialState:
     present: BoolArray
     lazy_noise: LazyNoise
     lapses: tuple[Lapses, ...]
-    unseen_behind_m: FloatArray  # least distance ahead of a player at which it sees road users
+    shoulder_glance: BoolArray  # whether a player glances over the shoulder
     limits: tuple[Limits, ...]
     member: tuple[int, ...]  # index of the driver that each player has in this game
     friction: float
@@ -119,14 +127,13 @@ def draw_initial_state(starts: StartDistribution, *parts: str | int) -> InitialS
         0 if len(shares) == 1 else draw_member(shares, player, *parts) for player, shares in enumerate(starts.shares)
     ]
     human_factors = [starts.human_factors[player][member[player]] for player in players]
-    unseen = [unseen_behind_m(each.sight, next(draws)) for each in human_factors]
+    shoulder_glance = [glances_over_shoulder(each.sight, next(draws)) for each in human_factors]
     limits = [_limits(each, starts, player, *parts) for player, each in enumerate(human_factors)]
     lapses = [Lapses.none(starts.steps)] * len(players)
-    for player, (each, limit) in enumerate(zip(human_factors, limits, strict=True)):
+    for player, each in enumerate(human_factors):
         if each.attention is not None:
             of_player = generator_of(*parts, "attention", player)
-            drawn = draw_lapses(each.attention, starts.steps, starts.step_s, of_player)
-            lapses[player] = drawn.with_reaction_delay(limit.delay_steps) if limit.delay_steps else drawn
+            lapses[player] = draw_lapses(each.attention, starts.steps, starts.step_s, of_player)
     x, y, heading, speeds, positions = np.array(poses).T
     stations = positions - 0.5 * starts.length_m
     if starts.along_route_share and not (starts.meet_in_place and sum(present) > 1):
@@ -150,9 +157,9 @@ def draw_initial_state(starts: StartDistribution, *parts: str | int) -> InitialS
         position_m=positions,
         station_m=stations,
         present=np.array(present),
-        lazy_noise=LazyNoise(generator, (len(players), starts.steps, 2)),
+        lazy_noise=LazyNoise(generator, (len(players), starts.steps, 2), starts.step_s),
         lapses=tuple(lapses),
-        unseen_behind_m=np.array(unseen),
+        shoulder_glance=np.array(shoulder_glance),
         limits=tuple(limits),
         member=tuple(member),
         friction=_varied(starts.friction, "friction", *parts),
@@ -208,7 +215,7 @@ def _limits(human_factors: HumanFactors, starts: StartDistribution, player: int,
     return Limits(
         delay_steps=round(delay_s / starts.step_s),
         sight_m=min(sight.range_m, sight.noticed_within_m) if fails_to_see else sight.range_m,
-        opening_rad=float(np.deg2rad(sight.opening_deg)),
+        field_of_view_rad=float(np.deg2rad(sight.field_of_view_deg)),
         estimation_errors=errors,
         actuator_shares=(shares.throttle_share, shares.braking_share, shares.steering_share),
     )

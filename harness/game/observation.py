@@ -3,6 +3,7 @@
 An observation is in the player's own frame and holds only what a driver can see: no intentions, personas, payoffs or
 plans. `harness.game.observation_layout` has its entries; here a function writes each group of them.
 
+Other players are seen as they would be if they had moved on as when they were looked at (`game.memory`).
 An error of estimated distances scales the distance of other bodies in their true direction. An error of closing speeds
 adds a radial velocity to theirs (`game.human_factors`). The free width at a distance ahead ends at the nearest surface
 on either side, rail or vehicle (paper, section 4.3.2: the ego "seeks to maintain a large distance between itself and
@@ -18,9 +19,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
+from harness.game.human_factors import BLIND_BEHIND_M, BLIND_BESIDE_M
 from harness.game.jit import compiled, inlined
 from harness.game.junctions import Control, Signal, StopLines
 from harness.game.meetings import Meetings
+from harness.game.memory import Perceived, as_they_are
 from harness.game.observation_layout import BEHIND, COMPRESSED, ENTRIES, FIRST_OTHER, OTHER, OTHERS, OWN, SCALE, SIZE
 from harness.game.quantities import Quantities
 from harness.game.road import AHEAD_M, Routes
@@ -46,7 +49,7 @@ class _Players(NamedTuple):
     steering_rad: FloatArray
     station_m: FloatArray
     present: BoolArray
-    unseen_behind_m: FloatArray
+    shoulder_glance: BoolArray
     sight_m: FloatArray
     sight_cosine: FloatArray
     distance_error: FloatArray
@@ -74,8 +77,9 @@ class _Views(NamedTuple):
 _columns = attrgetter(*_Players._fields)  # plain tuples: numba takes them apart three times as fast as records
 
 
-def observe(q: Quantities) -> FloatArray:
-    """[G, P, SIZE] float32 in [-1, 1]: the players' observations; zeros for players that are not present."""
+def observe(q: Quantities, perceived: Perceived | None = None) -> FloatArray:
+    """[G, P, SIZE] float32 in [-1, 1]: the players' observations; zeros for players that are not present. `perceived`:
+    the bodies as the players take them to be; left out: as they are."""
     world, rules, along = q.world, q.rules, q.along
     views = (  # the columns of `_Views`
         *(q.lateral_offset_m, rules.next_line, rules.posted_mps),
@@ -83,14 +87,17 @@ def observe(q: Quantities) -> FloatArray:
         *(world.actuators.max_steering_rad, world.length_m, world.width_m),
     )
     records = (q.bodies, world.road.routes, world.right_of_way.stop_lines, q.meetings)
-    return _observe((_columns(q.state), views, *map(tuple, records)))
+    if perceived is None:
+        perceived = as_they_are(q.bodies, q.state.present.shape[1])
+    moving = q.bodies.present.shape[1] - len(world.hiding.obstacles)
+    return _observe((_columns(q.state), views, *map(tuple, records)), perceived, moving)
 
 
 @compiled
-def _observe(tables: tuple[tuple[Any, ...], ...]) -> FloatArray:
+def _observe(tables: tuple[tuple[Any, ...], ...], perceived: Perceived, moving: int) -> FloatArray:
     """One compiled pass over the columns of players, views, bodies, routes, stop lines and meetings: several calls
     would cost more than their work. A record of arrays costs time at every call of a function with a loop: the loops
-    are here."""
+    are here. The first `moving` bodies are road users, and the others stand: nobody fails to see these."""
     players, views, bodies, routes = _Players(*tables[0]), _Views(*tables[1]), Bodies(*tables[2]), Routes(*tables[3])
     stop_lines, meetings = StopLines(*tables[4]), Meetings(*tables[5])
     observation, view = np.zeros((*players.present.shape, SIZE), dtype=np.float32), np.empty(SIZE)
@@ -119,11 +126,14 @@ def _observe(tables: tuple[tuple[Any, ...], ...]) -> FloatArray:
                     _see_signal(view, players.signals[g, link], players.signal_s[g, link])
             leader_m, leader_mps = np.inf, 0.0
             for b in range(count):
-                x_m, y_m, speed_mps = bodies.x_m[g, b], bodies.y_m[g, b], bodies.speed_mps[g, b]
+                x_m, y_m, their_heading_rad, speed_mps = perceived[:, g, p, b]
                 dx, dy = x_m - players.x_m[g, p], y_m - players.y_m[g, p]
                 ahead_m, distance_m = dx * cosine + dy * sine, np.hypot(dx, dy)
-                in_view = ahead_m >= players.unseen_behind_m[g, p] and ahead_m >= sight_cosine * distance_m
-                in_view = in_view and distance_m <= sight_m
+                in_view = distance_m <= (sight_m if b < moving else SEEN_M)
+                if ahead_m < sight_cosine * distance_m and not players.shoulder_glance[g, p]:
+                    beside_m = abs(dy * cosine - dx * sine) - 0.5 * views.width_m[p]
+                    behind_m = -ahead_m - 0.5 * views.length_m[p]
+                    in_view = in_view and _in_mirrors(ahead_m, beside_m, behind_m)
                 urgency_s[b] = distance_m / _NEARNESS_MPS
                 if meetings.conflict[g, p, b] >= 0:
                     own_s = max(meetings.own_m[g, p, b], 0.0) / max(own_mps, _LEAST_MPS)
@@ -133,7 +143,7 @@ def _observe(tables: tuple[tuple[Any, ...], ...]) -> FloatArray:
                 if seen[b]:
                     # where the player takes it to be
                     ahead_m, left_m, frame = point_along_route(place, routes, x_m + error * dx, y_m + error * dy)
-                    turned = bodies.heading_rad[g, b] - routes.heading_rad[frame]
+                    turned = their_heading_rad - routes.heading_rad[frame]
                     sizes_m = (bodies.length_m[g, b], bodies.width_m[g, b], views.length_m[p], views.width_m[p])
                     gap_m = _narrow_by(view, (ahead_m, left_m, turned), sizes_m)
                     if gap_m < leader_m:
@@ -149,10 +159,13 @@ def _observe(tables: tuple[tuple[Any, ...], ...]) -> FloatArray:
                     break
                 last, last_s = b, urgency_s[b]
                 entry = view[FIRST_OTHER + k * ENTRIES :]
-                _see_other(entry, (g, p, b), players, bodies)
+                _see_other(entry, (g, p, b), players, bodies, perceived)
                 if meetings.conflict[g, p, b] >= 0:
-                    ways_m = (meetings.own_m[g, p, b], meetings.other_m[g, p, b])
-                    _see_conflict(entry, 1.0 + error, ways_m, (own_mps, bodies.speed_mps[g, b]))
+                    x_m, y_m, their_heading_rad, speed_mps = perceived[:, g, p, b]
+                    ahead_by_m = (x_m - bodies.x_m[g, b]) * np.cos(their_heading_rad)
+                    ahead_by_m += (y_m - bodies.y_m[g, b]) * np.sin(their_heading_rad)
+                    ways_m = (meetings.own_m[g, p, b], meetings.other_m[g, p, b] - ahead_by_m)
+                    _see_conflict(entry, 1.0 + error, ways_m, (own_mps, speed_mps))
                     entry[OTHER.has_priority] = 1.0 if meetings.must_yield[g, p, b] else -1.0
             for k in range(SIZE):
                 observation[g, p, k] = _scaled(view[k], SCALE[k], COMPRESSED[k])
@@ -236,16 +249,27 @@ def _narrow(view: FloatArray, ends_m: tuple[float, float], left_m: float, half_w
                 view[OWN.free_right_m + k] = max(view[OWN.free_right_m + k], left_m + half_width_m)
 
 
+@compiled
+def _in_mirrors(ahead_m: float, beside_m: float, behind_m: float) -> bool:
+    """Whether mirrors show a centre that is ahead of the own centre, beside the own flank and behind the own rear."""
+    if ahead_m > 0.0:
+        return False
+    return behind_m > BLIND_BEHIND_M or beside_m > BLIND_BESIDE_M or beside_m < 0.0
+
+
 @inlined
-def _see_other(entry: FloatArray, which: tuple[int, int, int], players: _Players, bodies: Bodies) -> None:
+def _see_other(
+    entry: FloatArray, which: tuple[int, int, int], players: _Players, bodies: Bodies, perceived: Perceived
+) -> None:
     """Write the entries of one other body but those of the conflict with it."""
     g, p, b = which
-    own_mps, heading_rad, speed_mps = players.speed_mps[g, p], players.heading_rad[g, p], bodies.speed_mps[g, b]
-    dx, dy = bodies.x_m[g, b] - players.x_m[g, p], bodies.y_m[g, b] - players.y_m[g, p]
+    x_m, y_m, their_heading_rad, speed_mps = perceived[:, g, p, b]
+    own_mps, heading_rad = players.speed_mps[g, p], players.heading_rad[g, p]
+    dx, dy = x_m - players.x_m[g, p], y_m - players.y_m[g, p]
     cosine, sine = np.cos(heading_rad), np.sin(heading_rad)
     further = 1.0 + players.distance_error[g, p]
     ahead_m, left_m = dx * cosine + dy * sine, dy * cosine - dx * sine
-    turned, closing = bodies.heading_rad[g, b] - heading_rad, players.closing_error_per_s[g, p]
+    turned, closing = their_heading_rad - heading_rad, players.closing_error_per_s[g, p]
     entry[OTHER.seen] = 1.0
     entry[OTHER.ahead_m], entry[OTHER.left_m] = further * ahead_m, further * left_m
     entry[OTHER.ahead_mps] = speed_mps * np.cos(turned) - own_mps + closing * ahead_m

@@ -32,7 +32,7 @@ class Form(IntEnum):
     OVER = 1  # minus the positive part
     UNDER = 2  # the negative part
     LESS = 3  # minus the quantity
-    LESS_SQUARED = 4  # minus the square, in units of 10 m/s2
+    LESS_SQUARED = 4  # minus the square, in units of 10 m/s2 or 10 m/s3
     PER_100 = 5  # a hundredth of the quantity
     GAINED = 6  # 1 if equal to the parameter
     LOST = 7  # -1 if equal to the parameter
@@ -122,6 +122,7 @@ TERMS: Mapping[str, Term] = {
         per_second=False,
     ),
     "gap": _below("passing a crossing or a merge closer in time to another vehicle than this", "gap_s", "within_s"),
+    "lane_end": _below("being in a lane that ends sooner than this", "lane_end_m", "within_m"),
     "goal": _ends("operational", "reaching the goal", Form.GAINED, Outcome.GOAL),
     "timeout": _ends("operational", "not reaching the goal in time", Form.LOST, Outcome.TIMEOUT),
     "progress": _operational(
@@ -148,6 +149,12 @@ TERMS: Mapping[str, Term] = {
         quantity="state.acceleration_mps2",
         form=Form.LESS_SQUARED,
         example=("at 5 m/s²", 5.0),
+    ),
+    "jerk": _operational(
+        meaning="squared change of acceleration or braking per second, as a share of 10 m/s3",
+        quantity="jerk_mps3",
+        form=Form.LESS_SQUARED,
+        example=("at 5 m/s³", 5.0),
     ),
     "lateral_acceleration": _operational(
         meaning="squared lateral acceleration, as a share of 10 m/s2",

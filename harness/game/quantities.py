@@ -11,7 +11,7 @@ from operator import attrgetter
 
 import numpy as np
 
-from harness.game.arrays import BoolArray, FloatArray
+from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.bicycle import lateral_acceleration_mps2
 from harness.game.geometry import Box, distance_to_nearest_box, time_to_first_contact
 from harness.game.jit import compiled
@@ -36,6 +36,7 @@ class Quantities:
     bodies: Bodies
     advanced_m: FloatArray  # along the route since the previous step
     lateral_offset_m: FloatArray  # from the route's line, left positive
+    gained_mps2: FloatArray  # change of the acceleration since the previous step
 
     # --- columns of `state`, `along` and `rules` that personas, metrics and rules use by name ---------------------
 
@@ -46,6 +47,7 @@ class Quantities:
     goal_m = property(attrgetter("along.goal_m"))
     wrong_way = property(attrgetter("along.wrong_way"))
     passed_red_s = property(attrgetter("rules.passed_red_s"))
+    due_mps = property(attrgetter("rules.due_mps"))
 
     # --- the route ahead ---------------------------------------------------------------------------------------
 
@@ -68,6 +70,11 @@ class Quantities:
     def speed_over_limit(self) -> FloatArray:
         """Excess over the speed limit as a share of the limit; negative below the limit."""
         return self.state.speed_mps / self.speed_limit_mps - 1.0
+
+    @property
+    def jerk_mps3(self) -> FloatArray:
+        """Change of the acceleration along the heading per second."""
+        return self.gained_mps2 / self.world.step_s
 
     @cached_property
     def lateral_acceleration_mps2(self) -> FloatArray:
@@ -129,14 +136,24 @@ class Quantities:
         return OnPath(*on_path(self.state.station_m, self.lateral_offset_m, routes, boxes))
 
     @cached_property
-    def leader_gap_m(self) -> FloatArray:
-        """Trailing distance: gap, bumper to bumper along the route, to the nearest body ahead that overlaps the
-        player's width; inf without one."""
+    def _leader_gaps_m(self) -> FloatArray:
+        """[G, P, B] gaps to the bodies ahead that overlap the player's width; inf to others."""
         path = self.on_path
         overlaps = np.abs(path.left_m) < path.half_width_m + 0.5 * self.world.width_m[:, None]
         leads = self.visible & overlaps & (path.ahead_m > 0.0) & (path.ahead_m < SIGHT_M)
         gap = path.ahead_m - path.half_length_m - 0.5 * self.world.length_m[:, None]
-        return np.where(leads, np.maximum(gap, 0.0), np.inf).min(-1)
+        return np.where(leads, np.maximum(gap, 0.0), np.inf)
+
+    @property
+    def leader_gap_m(self) -> FloatArray:
+        """Trailing distance: gap, bumper to bumper along the route, to the nearest body ahead that overlaps the
+        player's width; inf without one."""
+        return self._leader_gaps_m.min(-1)
+
+    @property
+    def leader(self) -> IntArray:
+        """The body with this gap; -1 without one."""
+        return np.where(np.isfinite(self.leader_gap_m), self._leader_gaps_m.argmin(-1), -1)
 
     @cached_property
     def time_gap_s(self) -> FloatArray:

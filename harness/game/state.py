@@ -57,9 +57,9 @@ class State:
     outcome: IntArray
     present: BoolArray  # takes part in the game and has not left the scene
     lapsed: BoolArray  # has a lapse of attention in this step
-    unseen_behind_m: FloatArray  # least distance ahead at which road users are seen; -inf: all around
+    shoulder_glance: BoolArray  # sees what is in the blind spot, and beside the field of view
     sight_m: FloatArray  # greatest distance at which road users are seen
-    sight_cosine: FloatArray  # of half the opening angle within which road users are seen; -2: all around
+    sight_cosine: FloatArray  # of half the field of view, within which road users are seen directly; -2: all around
     distance_error: FloatArray  # error of estimated distances, as a share: + is farther than true
     closing_error_per_s: FloatArray  # error of closing speeds, per distance: + is moving away
     step: IntArray  # [G]
@@ -76,7 +76,7 @@ class State:
         columns |= {name: np.zeros(shape, dtype=bool) for name in ("present", "lapsed")}
         columns |= {
             "outcome": np.zeros(shape, dtype=np.int8),
-            "unseen_behind_m": np.full(shape, -np.inf),
+            "shoulder_glance": np.ones(shape, dtype=bool),
             "sight_m": np.full(shape, np.inf),
             "sight_cosine": np.full(shape, ALL_AROUND),
             "step": np.zeros(games, dtype=np.int64),

@@ -117,9 +117,9 @@ def _seed(seed: int, tables: RunTables) -> str:
 def portrait(document: Mapping[str, Any]) -> str:
     """A persona in one line, from its document in the manifest; empty without one."""
     sentences = [str(document.get("description", "")).strip()]
-    share = (document.get("perception") or {}).get("no_blind_spot_check_share")
+    share = (document.get("perception") or {}).get("no_shoulder_glance_share")
     if share:
-        sentences.append(f"It does not check the blind spot in {percent(share)} of drives.")
+        sentences.append(f"It does not glance over the shoulder in {percent(share)} of drives.")
     if attention := document.get("attention"):
         low, high = attention["lapse_s"]
         every = attention["mean_attentive_s"] + (low + high) / 2

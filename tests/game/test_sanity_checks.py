@@ -281,7 +281,7 @@ def everywhere(request: pytest.FixtureRequest) -> Quantities:
     size = (np.tile(each, (len(state.step), 1)) for each in (scene.world.length_m, scene.world.width_m))
     poses = (state.x_m, state.y_m, state.heading_rad, state.speed_mps)
     state.station_m, offset = routes.locate(state.x_m, state.y_m, state.station_m)
-    return Quantities(scene.world, state, Bodies(*poses, *size, state.present), np.zeros_like(offset), offset)
+    return Quantities(scene.world, state, Bodies(*poses, *size, state.present), np.zeros_like(offset), offset, np.zeros_like(offset))
 
 
 LOW = FuzzySet(name="low", inputs=(0.0, 1.0), memberships=(1.0, 0.0), value=-1.0)

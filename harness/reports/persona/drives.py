@@ -1,4 +1,4 @@
-"""Seeded sample drives of a persona: lapses of attention and missing blind-spot checks, drawn as in the game."""
+"""Seeded sample drives of a persona: lapses of attention and missing shoulder glances, drawn as in the game."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from harness.config.persona import Persona
 from harness.config.road_user import Actuators
-from harness.game.human_factors import Attention, Lapses, draw_lapses, unseen_behind_m
+from harness.game.human_factors import Attention, Lapses, draw_lapses, glances_over_shoulder
 from harness.game.seeding import generator_of
 
 DRIVES, DRIVE_S, STEP_S = 8, 60.0, 0.1
@@ -23,8 +23,8 @@ class SampleDrive:
 
     lapses: tuple[tuple[float, float], ...]
     """Begin and end of each lapse, s."""
-    no_blind_spot_check: bool
-    """Whether the person does not check the blind spot in this drive."""
+    shoulder_glance: bool
+    """Whether the person glances over the shoulder in this drive."""
 
     @property
     def lapsed_share(self) -> float:
@@ -42,16 +42,12 @@ def sample(persona: Persona) -> list[SampleDrive]:
             lapses = draw_lapses(
                 human_factors.attention, steps, STEP_S, generator_of("portrait", persona.name, "attention", k)
             )
-        ahead_m = unseen_behind_m(human_factors.sight, generator_of("portrait", persona.name, "start", k).random())
+        draw = generator_of("portrait", persona.name, "start", k).random()
         changes = np.flatnonzero(np.diff(np.concatenate(([0], lapses.lapsed.astype(int), [0])))).reshape(-1, 2) * STEP_S
         spans = tuple((float(begin), float(end)) for begin, end in changes)
-        drives.append(SampleDrive(lapses=spans, no_blind_spot_check=math.isfinite(ahead_m)))
+        glance = glances_over_shoulder(human_factors.sight, draw)
+        drives.append(SampleDrive(lapses=spans, shoulder_glance=glance))
     return drives
-
-
-def mean_lapse_s(attention: Attention) -> float:
-    """The mean length of a lapse, s: the middle of the uniform distribution it is drawn from."""
-    return 0.5 * (attention.lapse_s[0] + attention.lapse_s[1])
 
 
 def lapsed_share(attention: Attention) -> float:
@@ -60,12 +56,12 @@ def lapsed_share(attention: Attention) -> float:
     Lapses and attentive stretches alternate, so it is mean lapse / (mean lapse + mean attentive stretch): the share
     of time of an alternating renewal process (Ross, Introduction to Probability Models, section 7.5).
     """
-    return mean_lapse_s(attention) / (mean_lapse_s(attention) + attention.mean_attentive_s)
+    return attention.mean_lapse_s / (attention.mean_lapse_s + attention.mean_attentive_s)
 
 
 def lapses_per_minute(attention: Attention) -> float:
     """Lapses per minute, in the long run: one in each mean lapse + mean attentive stretch."""
-    return 60.0 / (mean_lapse_s(attention) + attention.mean_attentive_s)
+    return 60.0 / (attention.mean_lapse_s + attention.mean_attentive_s)
 
 
 def free_share(attention: Attention, drive_s: float = DRIVE_S) -> float:

@@ -13,7 +13,7 @@ from harness.reports.persona.profile import (
     ATTENDS,
     DECIDES,
     FORMULA,
-    NO_CHECK_MARK,
+    NO_GLANCE_MARK,
     WANTS,
     PersonaProfile,
     function_in_words,
@@ -79,7 +79,7 @@ def drives_figure(drives: Sequence[SampleDrive], name: str, alternative: str) ->
             axes.barh(row, DRIVE_S, 0.12, color=GRID, linewidth=0)
             for begin, end in drive.lapses:
                 axes.barh(row, end - begin, 0.6, left=begin, color=SERIES["persona"], linewidth=0)
-        names = [f"drive {k}" + (NO_CHECK_MARK if each.no_blind_spot_check else "") for k, each in enumerate(drives, 1)]
+        names = [f"drive {k}" + ("" if each.shoulder_glance else NO_GLANCE_MARK) for k, each in enumerate(drives, 1)]
         axes.set_yticks(range(len(drives)), names, fontsize=9)
         axes.tick_params(axis="y", length=0)
         axes.grid(visible=False, axis="y")

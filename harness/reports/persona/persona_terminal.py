@@ -15,7 +15,7 @@ from harness.reports.persona.profile import (
     ATTENDS,
     DECIDES,
     FORMULA,
-    NO_CHECK_MARK,
+    NO_GLANCE_MARK,
     WANTS,
     PersonaProfile,
     function_in_words,
@@ -80,7 +80,7 @@ def _examples(function: PayoffFunction) -> Iterable[Sequence[str]]:
 
 def _drives(profile: PersonaProfile) -> Iterable[Sequence[str]]:
     for k, drive in enumerate(profile.drives, 1):
-        check = NO_CHECK_MARK if drive.no_blind_spot_check else ""
+        check = "" if drive.shoulder_glance else NO_GLANCE_MARK
         yield f"{k}{check}", ", ".join(f"{begin:.3g} to {end:.3g}" for begin, end in drive.lapses) or "none"
 
 

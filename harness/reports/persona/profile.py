@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from harness.config.persona import Persona
-from harness.game.human_factors import PERSISTENCE_S
+from harness.game.human_factors import BLIND_BEHIND_M, BLIND_BESIDE_M, PERSISTENCE_S
 from harness.game.payoff_terms import GROUPS
 from harness.reports.persona.drives import (
     DRIFT_SPEED_MPS,
@@ -18,7 +18,6 @@ from harness.reports.persona.drives import (
     free_share,
     lapsed_share,
     lapses_per_minute,
-    mean_lapse_s,
     sample,
 )
 from harness.reports.persona.worth import PayoffFunction, TermExample, payoff_functions, term_examples
@@ -27,15 +26,18 @@ NEAR_M = 20.0
 """The distance at which errors are stated."""
 FORMULA = "payoff = α₀ · Σ safety + α₁ · Σ operational + α₂ · Σ human, summed over every step of the game"
 WANTS, ATTENDS, DECIDES = "What this person wants", "How this person attends", "How this person decides"
-NO_CHECK_MARK = " (no blind-spot check)"
-"""Marks a drive in which the person does not check the blind spot."""
+NO_GLANCE_MARK = " (no shoulder glance)"
+"""Marks a drive in which the person does not glance over the shoulder."""
 COLLISION_IS_FREE = "A collision itself costs nothing."
 NO_LAPSES = "Attention never lapses."
-STRAIGHT_WHEEL = "The wheel is then straight."
-ALWAYS_CHECKS = "The person checks the blind spot in every drive."
-AFTER_A_LAPSE = "After a lapse, the car stays uncontrolled for the same time again."
+IN_A_LAPSE = {
+    "released": "In a lapse the person releases pedals and wheel.",
+    "held": "In a lapse the person holds the pedals, and the wheel follows the road.",
+}
+ALWAYS_GLANCES = "The person glances over the shoulder in every drive."
+AFTER_A_LAPSE = "After a lapse, the others are taken for the same time to move on as before it."
 UNIMPAIRED_IN_TRAINING = (
-    "While the person itself is trained, it checks the blind spot and sees every vehicle; all else is as in driving."
+    "While the person itself is trained, it glances over the shoulder and sees every vehicle; all else is as it drives."
 )
 SAMPLED = "Actions are sampled from the policy's distribution, so no two drives are the same."
 MOST_LIKELY = "The action is always the policy's most likely one."
@@ -137,9 +139,10 @@ def _attention(persona: Persona, drives: Sequence[SampleDrive]) -> Iterator[str]
     if attention is None:
         yield NO_LAPSES
         return
-    lapse_s = mean_lapse_s(attention)
     shortest, longest = attention.lapse_s
     length = f"{shortest:g} s" if shortest == longest else f"{shortest:g} to {longest:g} s"
+    if attention.lapse_distribution == "lognormal":
+        length = f"{attention.mean_lapse_s:.2g} s on average, {length} in the middle 90 %"
     yield (
         f"Eyes off the road {percent(lapsed_share(attention))} of the time, in the long run: lapses of {length}, "
         f"with {attention.mean_attentive_s:g} s of attention between them on average; "
@@ -150,35 +153,25 @@ def _attention(persona: Persona, drives: Sequence[SampleDrive]) -> Iterator[str]
         f"In the {len(drives)} sample drives: {percent(drawn_share)}. Of drives of {DRIVE_S:g} s, "
         f"{percent(free_share(attention))} have no lapse."
     )
-    yield "In a lapse the person releases pedals and wheel. " + _drifts(
-        attention.crown_steering_rad, attention.bump_steering_sd_rad, lapse_s
-    )
-
-
-def _drifts(crown_rad: float, bumps_rad: float, lapse_s: float) -> str:
-    if crown_rad == bumps_rad == 0.0:
-        return STRAIGHT_WHEEL
-    right_m, spread_m = drift_m(crown_rad, lapse_s), drift_m(bumps_rad, lapse_s)
-    where = f"{right_m:.2g} m to the right" if right_m else "on average not displaced"
-    spread = f" (standard deviation {spread_m:.2g} m)" if spread_m else ""
-    return (
-        f"At {DRIFT_SPEED_MPS * 3.6:.0f} km/h on a straight road, a car of {WHEELBASE_M:g} m wheelbase is then, after "
-        f"{lapse_s:g} s, {where}{spread}."
-    )
+    yield IN_A_LAPSE[attention.controls]
+    if attention.bump_steering_sd_rad:
+        lapse_s = attention.mean_lapse_s
+        yield (
+            f"At {DRIFT_SPEED_MPS * 3.6:.0f} km/h on a straight road, a car of {WHEELBASE_M:g} m wheelbase drifts in "
+            f"{lapse_s:.2g} s by {drift_m(attention.bump_steering_sd_rad, lapse_s):.2g} m (standard deviation)."
+        )
 
 
 def _blind_spot(persona: Persona, drives: Sequence[SampleDrive]) -> Iterator[str]:
     sight = persona.human_factors.sight
-    if sight.no_blind_spot_check_share == 0.0:
-        yield ALWAYS_CHECKS
+    if sight.no_shoulder_glance_share == 0.0:
+        yield ALWAYS_GLANCES
         return
-    ahead_m = sight.unseen_behind_m
-    where = f"is not at least {ahead_m:g} m ahead of" if ahead_m >= 0.0 else f"is more than {-ahead_m:g} m behind"
-    count = sum(each.no_blind_spot_check for each in drives)
+    count = sum(not each.shoulder_glance for each in drives)
     yield (
-        f"No blind-spot check in {percent(sight.no_blind_spot_check_share)} of the drives "
-        f"({count} of the {len(drives)} sample drives): "
-        f"a vehicle is not seen when its centre {where} the person's own."
+        f"No glance over the shoulder in {percent(sight.no_shoulder_glance_share)} of the drives "
+        f"({count} of the {len(drives)} sample drives): a vehicle is not seen when its centre is beside the person's "
+        f"car, within {BLIND_BESIDE_M:g} m, or behind its rear within {BLIND_BEHIND_M:g} m."
     )
 
 
@@ -190,6 +183,8 @@ def _body(persona: Persona) -> Iterator[str]:
             f"In {percent(sight.looked_but_failed_to_see_share)} of the drives the person looks but fails to see: "
             f"a vehicle is noticed within {sight.noticed_within_m:g} m only."
         )
+    if sight.field_of_view_deg < 360.0:
+        yield f"The field of view is {sight.field_of_view_deg:g} degrees; mirrors show what is behind it."
     if math.isfinite(sight.range_m):
         yield f"Vehicles more than {sight.range_m:g} m away are never seen."
     if sight.distance_error:
@@ -204,7 +199,7 @@ def _body(persona: Persona) -> Iterator[str]:
     if longest > 0.0:
         length = f"{shortest:g}" if shortest == longest else f"{shortest:g} to {longest:g}"
         speed, distance_m = f"{DRIFT_SPEED_MPS * 3.6:.0f} km/h", DRIFT_SPEED_MPS * longest
-        yield f"A decision takes effect {length} s later: at {speed} after up to {distance_m:.2g} m."
+        yield f"What others do is known {length} s later: at {speed} after up to {distance_m:.2g} m."
         if human_factors.attention is not None:
             yield AFTER_A_LAPSE
     uses = human_factors.actuator_shares

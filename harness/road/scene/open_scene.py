@@ -14,6 +14,7 @@ from harness.game.arrays import FloatArray
 from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import StartDistribution
 from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles
+from harness.game.roles import EGO
 from harness.game.seeding import between
 from harness.game.start_range import StartRange
 from harness.game.world import World
@@ -114,11 +115,12 @@ class OpenScene:
     ) -> StartDistribution:
         """The distribution of initial states for players with these human factors and probabilities of taking part.
 
-        A player with several drivers has the human factors of each, and the `shares` [P][n] of the games of each. In
-        `along_route_share` of the games, players start anywhere along their routes.
+        A player with several drivers has the human factors of each, and the `shares` [P][n] of the games of each. The
+        ego is a machine and has none. In `along_route_share` of the games, players start anywhere along their routes.
         """
         varies = self.document.varies
         factors_of = [[each] if isinstance(each, HumanFactors) else list(each) for each in human_factors]
+        factors_of[EGO] = [HumanFactors()] * len(factors_of[EGO])
         return StartDistribution(
             places=self.places,
             length_m=self.world.length_m,

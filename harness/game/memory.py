@@ -1,0 +1,73 @@
+"""What players know of each other: where the others would be now if they had moved on as when they were last looked at.
+
+People anticipate: during their reaction time they take others to keep their speed and heading (Treiber, Kesting and
+Helbing, Delays, inaccuracies and anticipation in microscopic traffic models, Physica A 360, 2006, section 2.3).
+Background traffic and obstacles are known as they are.
+"""
+
+from __future__ import annotations
+
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from harness.game.arrays import FloatArray, IntArray
+from harness.game.jit import compiled
+from harness.game.state import Bodies, State
+
+Perceived: TypeAlias = FloatArray
+"""[4, G, P, B] x_m, y_m, heading_rad and speed_mps of the bodies as each player takes them to be."""
+
+STEPS = 64
+"""Steps that are remembered; what is older counts as this old."""
+
+
+class Memory:
+    """The last motion of the players of G games."""
+
+    def __init__(self, games: int, players: int, step_s: float) -> None:
+        self._motion = np.zeros((STEPS, 4, games, players))
+        self._now, self._step_s = 0, step_s
+
+    def remember(self, state: State) -> None:
+        """Add the motion of the players in this step."""
+        self._now = (self._now + 1) % STEPS
+        self.begin(state)
+
+    def begin(self, state: State) -> None:
+        """Set the motion of this step, of games that begin."""
+        self._motion[self._now] = state.x_m, state.y_m, state.heading_rad, state.speed_mps
+
+    def perceived(self, bodies: Bodies, lags: IntArray) -> Perceived:
+        """The bodies as players take them to be whose knowledge of each other is so many steps old, [G, P]."""
+        return _perceived(tuple(bodies), self._motion, np.minimum(lags, STEPS - 1), (self._now, self._step_s))
+
+
+def as_they_are(bodies: Bodies, players: int) -> Perceived:
+    """The bodies as `players` players without reaction time take them to be."""
+    return _as_they_are(tuple(bodies), players)
+
+
+@compiled
+def _as_they_are(columns: tuple[Any, ...], players: int) -> FloatArray:
+    bodies = Bodies(*columns)
+    perceived = np.empty((4, bodies.present.shape[0], players, bodies.present.shape[1]))
+    for p in range(players):
+        perceived[0, :, p], perceived[1, :, p] = bodies.x_m, bodies.y_m
+        perceived[2, :, p], perceived[3, :, p] = bodies.heading_rad, bodies.speed_mps
+    return perceived
+
+
+@compiled
+def _perceived(columns: tuple[Any, ...], motion: FloatArray, lags: IntArray, when: tuple[int, float]) -> FloatArray:
+    perceived, (now, step_s), players = _as_they_are(columns, lags.shape[1]), when, lags.shape[1]
+    for g, p in np.ndindex(lags.shape):
+        lag = lags[g, p]
+        for b in range(players):
+            if lag > 0 and b != p:
+                x_m, y_m, heading_rad, speed_mps = motion[(now - lag) % STEPS, :, g, b]
+                moved_m = speed_mps * lag * step_s
+                perceived[0, g, p, b] = x_m + moved_m * np.cos(heading_rad)
+                perceived[1, g, p, b] = y_m + moved_m * np.sin(heading_rad)
+                perceived[2, g, p, b], perceived[3, g, p, b] = heading_rad, speed_mps
+    return perceived
