@@ -83,8 +83,8 @@ def lateral_wander_m(drive: Drive) -> float | None:
 
 @metric(
     "conduct",
-    meaning=f"Median gap over own speed while following: behind the same vehicle, within {FOLLOWS_S:g} s, for more than "
-    f"{_FOLLOWS_LEAST_S:g} s.",
+    meaning=f"Median gap over own speed while following: behind the same vehicle, within {FOLLOWS_S:g} s, for more "
+    f"than {_FOLLOWS_LEAST_S:g} s.",
 )
 def following_gap_s(drive: Drive) -> float | None:
     gaps_s = drive.of("time_gap_s")

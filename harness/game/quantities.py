@@ -144,13 +144,13 @@ class Quantities:
         gap = path.ahead_m - path.half_length_m - 0.5 * self.world.length_m[:, None]
         return np.where(leads, np.maximum(gap, 0.0), np.inf)
 
-    @property
+    @cached_property
     def leader_gap_m(self) -> FloatArray:
         """Trailing distance: gap, bumper to bumper along the route, to the nearest body ahead that overlaps the
         player's width; inf without one."""
         return self._leader_gaps_m.min(-1)
 
-    @property
+    @cached_property
     def leader(self) -> IntArray:
         """The body with this gap; -1 without one."""
         return np.where(np.isfinite(self.leader_gap_m), self._leader_gaps_m.argmin(-1), -1)
