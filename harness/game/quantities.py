@@ -62,9 +62,13 @@ class Quantities:
     def along(self) -> Along:
         """The route at the players."""
         state, world = self.state, self.world
-        shares, wheelbase_m = state.limit_share, world.actuators.wheelbase_m
-        where = (state.station_m, self.lateral_offset_m, state.speed_mps)
-        return world.road.routes.along(*where, limit_share=shares, wheelbase_m=wheelbase_m)
+        car, where = world.actuators, (state.station_m, self.lateral_offset_m, state.speed_mps)
+        return world.road.routes.along(
+            *where,
+            limit_share=state.limit_share,
+            wheelbase_m=car.wheelbase_m,
+            steering_lag_s=car.steering_lag_s,
+        )
 
     @cached_property
     def speed_over_limit(self) -> FloatArray:

@@ -137,10 +137,12 @@ class Routes(NamedTuple):
         *,
         limit_share: FloatArray,
         wheelbase_m: FloatArray,
+        steering_lag_s: FloatArray,
     ) -> Along:
-        """The routes at players with stations, lateral offsets and speeds [G, P], factors on the speed limits [G] and
-        wheelbases [P]."""
-        return Along(*_along((station_m, offset_m, speed_mps), limit_share, wheelbase_m, tuple(self)))
+        """The routes at players with stations, lateral offsets and speeds [G, P], factors on the speed limits [G],
+        wheelbases and lags of the steering [P]."""
+        players, wheels = (station_m, offset_m, speed_mps), (wheelbase_m, steering_lag_s)
+        return Along(*_along(players, limit_share, wheels, tuple(self)))
 
 
 @compiled
@@ -182,14 +184,16 @@ def _locate(x_m: FloatArray, y_m: FloatArray, station_m: FloatArray, table: tupl
 def _along(
     players: tuple[FloatArray, FloatArray, FloatArray],
     limit_share: FloatArray,
-    wheelbase_m: FloatArray,
+    wheels: tuple[FloatArray, FloatArray],
     table: tuple[Any, ...],
 ) -> FloatArray:
-    """[7, G, P] the columns of `Along`, of players with stations, offsets and speeds.
+    """[7, G, P] the columns of `Along`, of players with stations, offsets and speeds; `wheels` are their wheelbases and
+    lags of steering.
 
-    A car follows the road by the bend at its rear axle, which has no slip, in `PREVIEW_S`. With the bend at the centre,
-    it would leave a quarter circle by two metres.
+    A car follows the road by the bend at its rear axle, which has no slip, in `PREVIEW_S` after the lag of its
+    steering. With the bend at the centre, it would leave a quarter circle by two metres.
     """
+    wheelbase_m, steering_lag_s = wheels
     routes, (station_m, offset_m, speed_mps) = Routes(*table), players
     along = np.empty((_ALONG, *station_m.shape))
     for g, p in np.ndindex(station_m.shape):
@@ -197,7 +201,8 @@ def _along(
         row = row_at(station, first, last)
         lane_offset, lane_end = _lane_at(row, offset, routes.lane_offset_m, routes.lane_end_m)
         beside = offset > routes.own_left_m[row] or offset < routes.own_right_m[row]
-        rear_axle = row_at(station - 0.5 * wheelbase_m[p] + PREVIEW_S * speed_mps[g, p], first, last)
+        ahead_m = (PREVIEW_S + steering_lag_s[p]) * speed_mps[g, p] - 0.5 * wheelbase_m[p]
+        rear_axle = row_at(station + ahead_m, first, last)
         columns = (
             routes.speed_limit_mps[row] * limit_share[g],
             routes.approach_mps[row] * limit_share[g],

@@ -25,7 +25,7 @@ from harness.game.initial_state import InitialState, draw_initial_state
 from harness.road.scene.open_scene import OpenScene
 from tests.support.rollouts import Steady
 
-TEXTING = HumanFactors(attention=Attention(mean_attentive_s=2.0, lapse_s=(1.0, 2.0), crown_steering_rad=0.02))
+TEXTING = HumanFactors(attention=Attention(mean_attentive_s=2.0, lapse_s=(1.0, 2.0)))
 
 
 class Recording(Steady):

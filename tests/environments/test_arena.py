@@ -159,18 +159,36 @@ def test_goal__the_player_is_removed_and_the_other_continues(background: bool, t
     assert arena.observation[0, 1, LAYOUT.index("other0_seen")] == 0.0
 
 
-def test_wreck__stays_as_an_obstacle_without_speed_or_payoff(straight: OpenScene, arena_of: Open) -> None:
-    arena = after_reset(arena_of(straight), placed(straight, (100, RIGHT_Y, 0, 10), (120, RIGHT_Y, 0.6, 10)))
+def test_wreck__slides_along_the_rail_and_stays_as_an_obstacle_without_payoff(
+    straight: OpenScene, arena_of: Open
+) -> None:
+    arena = after_reset(arena_of(straight), placed(straight, (60, RIGHT_Y, 0, 10), (120, RIGHT_Y, 0.6, 10)))
     while not outcomes(arena)[1]:
         arena.step(COAST)
     assert outcomes(arena) == ["", "rail"]
-    where = arena.state.x_m[0, 1], arena.state.y_m[0, 1]
+    at_rail_m, heading_rad = arena.state.x_m[0, 1], arena.state.heading_rad[0, 1]
+    along_mps = 10.0 * np.cos(heading_rad)  # the road goes east
+    assert arena.state.speed_mps[0, 1] == pytest.approx(along_mps, rel=1e-3)
+    y_m = arena.state.y_m[0, 1]
     steps = play_to_the_end(arena)
     assert outcomes(arena) == ["collision", "rail"]
-    assert (arena.state.x_m[0, 1], arena.state.y_m[0, 1]) == where
-    assert arena.state.speed_mps[0].tolist() == [0.0, 0.0]
+    # friction brakes it: v^2 / (2 mu g), less half a step of the first 8.2 m/s, as a displacement is the new speed's
+    slid_m = along_mps**2 / (2.0 * 0.8 * 9.81)
+    assert arena.state.x_m[0, 1] - at_rail_m == pytest.approx(slid_m, abs=0.5)
+    assert arena.state.y_m[0, 1] == pytest.approx(y_m, abs=1e-6)
+    assert arena.state.heading_rad[0, 1] == heading_rad
     assert all(step.payoff[0, 1] == 0.0 and not step.drove[0, 1] for step in steps)
     assert (arena.step(COAST).payoff == 0.0).all()
+
+
+def test_wreck__after_a_collision_goes_on_in_its_direction(straight: OpenScene, arena_of: Open) -> None:
+    arena = after_reset(arena_of(straight), placed(straight, (100, RIGHT_Y, 0, 12), (107, RIGHT_Y, 0, 3)))
+    play_to_the_end(arena)
+    assert outcomes(arena) == ["collision", "collision"]
+    speeds = arena.state.speed_mps[0].copy()
+    assert (speeds > 0.0).all()
+    arena.step(COAST)
+    assert arena.state.speed_mps[0] == pytest.approx(np.maximum(speeds - 0.8 * 9.81 * 0.1, 0.0))
 
 
 def test_wreck__of_a_player_driven_by_sumo_stands_in_sumo_too(straight: OpenScene, arena_of: Open) -> None:

@@ -49,6 +49,27 @@ def test_drive__one_step(
     assert {name: getattr(state, name)[0, 0] for name in expected} == pytest.approx(expected)
 
 
+def test_drive__pedals_and_wheel_follow_requests_with_their_lags() -> None:
+    # a lag of 0.5 s follows 1 - exp(-0.1 / 0.5) = 0.18126925 of a request in 0.1 s, one of 0.2 s 0.39346934, one of
+    # 0.1 s 0.63212056
+    car = actuators(throttle_lag_s=0.5, brake_lag_s=0.2, steering_lag_s=0.1)
+    state = state_of(10.0)
+    advance(state, 2.0, 0.05, car)
+    assert state.acceleration_mps2[0, 0] == pytest.approx(2.0 * 0.18126925)
+    assert state.steering_rad[0, 0] == pytest.approx(0.05 * 0.63212056)
+    advance(state, -4.0, 0.05, car)  # from 0.3625385 to -4.0: 0.39346934 of -4.3625385
+    assert state.acceleration_mps2[0, 0] == pytest.approx(0.3625385 - 4.3625385 * 0.39346934)
+    assert state.steering_rad[0, 0] == pytest.approx(0.05 * (1.0 - 0.36787944**2))
+
+
+def test_drive__the_acceleration_changes_by_no_more_than_the_limit_of_the_jerk() -> None:
+    # 12.65 m/s3: 1.265 m/s2 in each 0.1 s, so that 0.774 g are reached within 0.6 s, as in UN R157
+    state, car = state_of(20.0), actuators(max_jerk_mps3=12.65)
+    for step in range(1, 7):
+        advance(state, -7.59294, 0.0, car)
+        assert state.acceleration_mps2[0, 0] == pytest.approx(-1.265 * step if step < 6 else -7.59)
+
+
 def test_drive__one_step_of_a_turn_agrees_with_a_hand_calculation() -> None:
     # At 10 m/s with the wheels at 0.1 rad and coasting:
     #   tan 0.1 = 0.10033467       slip = atan(0.05016734) = 0.05012534, cos slip = 0.99874399

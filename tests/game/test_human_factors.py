@@ -1,4 +1,4 @@
-"""Human factors by hand: late decisions, inexact and limited sight, partial use of the car, lapses of attention."""
+"""Human factors by hand: reaction time, inexact and limited sight, partial use of the car, lapses of attention."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from harness.game.human_factors import (
     Sight,
     draw_estimation_errors,
     draw_lapses,
-    unseen_behind_m,
+    glances_over_shoulder,
 )
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.observation_layout import LAYOUT, in_units
@@ -60,42 +60,45 @@ def played(arena: Arena, starts: dict[int, InitialState], actions: FloatArray) -
 # --- reaction ---------------------------------------------------------------------------------------------------------
 
 
-def test_delay__the_car_follows_earlier_decisions(arena: Arena, straight: OpenScene) -> None:
-    start = drawn(straight, 1)
-    actions = np.random.default_rng(0).uniform(-0.3, 0.3, (12, 2, 2, 2))
-    actions[:, 1] = actions[:, 0]  # the same decisions in both games
-    seen = played(arena, {0: start, 1: limited(start, 0, Limits(delay_steps=4))}, actions)
-    assert not seen[3][0][1, 0]
-    assert not seen[3][1][1, 0]
-    for step in range(4, 12):
-        pedals = actions[step - 4, 1, 0, 0]
-        car = straight.world.actuators
-        largest = car.max_acceleration_mps2 if pedals > 0 else car.max_braking_mps2
-        assert seen[step][0][1, 0] == pytest.approx(pedals * largest[0], rel=0.05)  # less the friction circle
-    assert (seen[3][0][1, 1] == seen[3][0][0, 1]).all()  # the other player has no delay
+def test_reaction__others_are_taken_to_move_on_as_they_did(arena: Arena, straight: OpenScene) -> None:
+    """The other player brakes from the first step on. With a reaction time of 4 steps the first player takes it to
+    have kept its speed, from where it was 4 steps ago."""
+    start, actions = drawn(straight, 1), np.zeros((12, 2, 2, 2))
+    actions[:, :, 1, 0] = -0.5
+    late = {0: start, 1: limited(start, 0, Limits(delay_steps=4))}
+    arena.reset(late)
+    ahead, closing = LAYOUT.index("other0_ahead_m"), LAYOUT.index("other0_ahead_mps")
+    places, speeds = [arena.state.x_m[1, 1]], [arena.state.speed_mps[1, 1]]
+    for step, action in enumerate(actions, 1):
+        arena.step(action)
+        places.append(arena.state.x_m[1, 1])
+        speeds.append(arena.state.speed_mps[1, 1])
+        known = max(step - 4, 0)
+        own_m, own_mps = arena.state.x_m[1, 0], arena.state.speed_mps[1, 0]
+        view = in_units(arena.observation[:, 0], 0.6)
+        taken_m = places[known] + speeds[known] * (step - known) * 0.1
+        assert view[1, ahead] == pytest.approx(taken_m - own_m, abs=1e-3)
+        assert view[1, closing] == pytest.approx(speeds[known] - own_mps, abs=1e-3)
+        assert view[0, ahead] == pytest.approx(places[-1] - own_m, abs=1e-3)  # in the other game at once
 
 
-def test_delay__after_a_lapse_the_controls_are_released_until_the_first_decision_arrives() -> None:
-    lapsed = np.array([False, True, True, False, False, False, False, True, False, False])
-    steering = np.where(lapsed, -0.01, 0.0)
-    steering[7] = 0.02
-    delayed = Lapses(lapsed, steering).with_reaction_delay(2)
-    assert delayed.lapsed.tolist() == [False, True, True, True, True, False, False, True, True, True]
-    assert delayed.steering_rad.tolist() == [0.0, -0.01, -0.01, -0.01, -0.01, 0.0, 0.0, 0.02, 0.02, 0.02]
+def test_reaction__a_lapse_stops_what_is_known() -> None:
+    lapsed = np.array([False, False, True, True, True, False, False, False])
+    lapses = Lapses(lapsed, np.zeros(8))
+    assert lapses.lags(0).tolist() == [0, 0, 1, 2, 3, 0, 0, 0]
+    # two steps late: in step 5 what was known in step 3, which is that of step 1
+    assert lapses.lags(2).tolist() == [0, 1, 2, 2, 3, 4, 5, 2]
 
 
 @settings(max_examples=50, deadline=None)
 @given(seed=st.integers(0, 2**32), delay=st.integers(0, 30))
-def test_delay__extends_lapses_and_starts_none_earlier(seed: int, delay: int) -> None:
-    attention = Attention(mean_attentive_s=3.0, lapse_s=(0.5, 2.0), bump_steering_sd_rad=0.001)
-    lapses = draw_lapses(attention, 200, 0.1, np.random.default_rng(seed))
-    delayed = lapses.with_reaction_delay(delay)
-    assert (delayed.lapsed >= lapses.lapsed).all()
-    assert (delayed.steering_rad[lapses.lapsed] == lapses.steering_rad[lapses.lapsed]).all()
-    begins = np.flatnonzero(np.diff(np.concatenate(([0], delayed.lapsed.astype(int)))) == 1)
-    assert lapses.lapsed[begins].all()
-    if delay == 0:
-        assert (delayed.lapsed == lapses.lapsed).all()
+def test_reaction__nothing_is_known_sooner_or_of_before_the_game(seed: int, delay: int) -> None:
+    attention = Attention(mean_attentive_s=3.0, lapse_s=(0.5, 2.0))
+    lags = draw_lapses(attention, 200, 0.1, np.random.default_rng(seed)).lags(delay)
+    steps = np.arange(200)
+    assert (lags <= steps).all()
+    assert (lags >= np.minimum(delay, steps)).all()
+    assert (np.diff(steps - lags) >= 0).all()  # what was known is not forgotten
 
 
 def body_limits(straight: OpenScene, human_factors: HumanFactors, games: int) -> list[Limits]:
@@ -104,7 +107,7 @@ def body_limits(straight: OpenScene, human_factors: HumanFactors, games: int) ->
     return [draw_initial_state(starts, "episode", game).limits[1] for game in range(games)]
 
 
-def test_delay__is_drawn_from_its_range(straight: OpenScene) -> None:
+def test_reaction__is_drawn_from_its_range(straight: OpenScene) -> None:
     late = HumanFactors(reaction=Reaction(delay_s=(0.3, 0.8)))
     drawn = [each.delay_steps for each in body_limits(straight, late, 500)]
     assert set(drawn) == {3, 4, 5, 6, 7, 8}
@@ -178,7 +181,7 @@ def test_failure_to_see__occurs_in_its_share_of_the_games(straight: OpenScene) -
 
 
 def test_open_eyes__remove_failures_to_see_and_keep_the_limits_of_the_body() -> None:
-    failures = {"no_blind_spot_check_share": 0.5, "unseen_behind_m": 1.0}
+    failures = {"no_shoulder_glance_share": 0.5}
     failures |= {"looked_but_failed_to_see_share": 0.5, "noticed_within_m": 5.0}
     late = Reaction(delay_s=(0.2, 0.4))
     person = HumanFactors(reaction=late, sight=Sight(range_m=60.0, **failures))
@@ -193,8 +196,9 @@ def test_actuator_shares__limit_the_car(arena: Arena, straight: OpenScene) -> No
     actions[..., 0] = 1.0
     (first, *_) = played(arena, {0: start, 1: limited(start, 1, Limits(actuator_shares=(0.4, 1.0, 1.0)))}, actions)
     largest = straight.world.actuators.max_acceleration_mps2
-    assert first[0][0] == pytest.approx(largest)
-    assert first[0][1] == pytest.approx([largest[0], 0.4 * largest[1]])
+    followed = 1.0 - np.exp(-0.1 / straight.world.actuators.throttle_lag_s)  # of a request, in a step
+    assert first[0][0] == pytest.approx(followed * largest)
+    assert first[0][1] == pytest.approx(followed * [largest[0], 0.4 * largest[1]])
 
 
 # --- independent draws ------------------------------------------------------------------------------------------------
@@ -278,9 +282,44 @@ def test_lapses__are_apart_and_within_the_range(
             assert length >= max(shortest / step - 0.5 - 1e-9, 1)
 
 
-def test_blind_spot_check__is_missing_in_its_share_of_the_games() -> None:
-    factor = Sight(no_blind_spot_check_share=0.75, unseen_behind_m=1.0)
-    drawn = [unseen_behind_m(factor, draw) for draw in np.random.default_rng(1).random(2000)]
-    assert set(drawn) == {1.0, -np.inf}
+def test_glances__have_a_lognormal_length_with_the_middle_90_percent_in_the_range() -> None:
+    glances = Attention(mean_attentive_s=1.5, lapse_s=(0.42, 4.0), lapse_distribution="lognormal")
+    drawn = np.array([glances.lapse_at_s(np.random.default_rng(seed)) for seed in range(4000)])
+    assert np.quantile(drawn, [0.05, 0.95]) == pytest.approx([0.42, 4.0], rel=0.1)
+    # mu = ln(0.42 * 4.0) / 2 = 0.2594, sigma = ln(4.0 / 0.42) / 3.2898 = 0.6851: exp(mu + sigma^2 / 2) = 1.639
+    assert glances.mean_lapse_s == pytest.approx(1.639, abs=1e-3)
+    assert drawn.mean() == pytest.approx(1.639, rel=0.05)  # standard error 1.27 / sqrt(4000) = 0.02
+    assert np.mean(drawn >= 2.0) == pytest.approx(0.265, abs=0.03)  # what was counted of young drivers
+
+
+def test_lapses__released_or_held(arena: Arena, straight: OpenScene) -> None:
+    """Both players brake for two steps, then their attention lapses: one releases the pedals, one holds them."""
+    start, steps = drawn(straight, 1), straight.world.steps
+    lapsed = np.arange(steps) >= 2
+    held, released = (Lapses(lapsed, np.zeros(steps), held=each) for each in (True, False))
+    actions = np.zeros((8, 2, 2, 2))
+    actions[..., 0] = np.where(np.arange(8) < 2, -0.2, 0.5)[:, None, None]
+    played_steps = played(arena, {0: replace(start, lapses=(released, held)), 1: start}, actions)
+    braking = played_steps[1][0][0]
+    assert (braking < 0.0).all()
+    for acceleration, steering, _ in played_steps[2:]:
+        assert acceleration[0, 1] == pytest.approx(braking[1])
+        assert steering[0] == pytest.approx([0.0, 0.0], abs=1e-9)
+    released_mps2 = [each[0][0, 0] for each in played_steps[1:]]
+    assert (np.diff(np.abs(released_mps2)) < 0.0).all()  # it fades with the lag of the pedals
+
+
+def test_shoulder_glance__is_missing_in_its_share_of_the_games() -> None:
+    factor = Sight(no_shoulder_glance_share=0.75)
+    drawn = [glances_over_shoulder(factor, draw) for draw in np.random.default_rng(1).random(2000)]
     # standard error sqrt(0.75 * 0.25 / 2000) = 0.0097
-    assert np.mean(np.isfinite(drawn)) == pytest.approx(0.75, abs=4 * 0.0097)
+    assert np.mean(drawn) == pytest.approx(0.25, abs=4 * 0.0097)
+
+
+def test_hands__random_decisions_are_correlated_in_time(straight: OpenScene) -> None:
+    noise = np.array([drawn(straight, seed).noise for seed in range(300)])  # [N, P, T, 2]
+    for step in (0, 100):
+        assert noise[:, :, step].std() == pytest.approx(1.0, abs=0.1)
+    for later, correlation in ((1, np.exp(-0.2)), (5, np.exp(-1.0)), (40, 0.0)):  # steps of 0.1 s; 0.5 s
+        pairs = noise[:, :, 20].ravel(), noise[:, :, 20 + later].ravel()
+        assert np.corrcoef(*pairs)[0, 1] == pytest.approx(correlation, abs=0.12)  # 4 standard errors of 1 / sqrt(1200)

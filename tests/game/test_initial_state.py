@@ -15,7 +15,7 @@ from harness.game.seeding import seed_of
 from harness.game.start_range import OnLine, StartRange
 from harness.road.scene.open_scene import OpenScene
 
-TEXTING = HumanFactors(attention=Attention(mean_attentive_s=2.0, lapse_s=(1.0, 2.0), crown_steering_rad=0.02))
+TEXTING = HumanFactors(attention=Attention(mean_attentive_s=2.0, lapse_s=(1.0, 2.0)))
 
 
 @pytest.fixture(scope="module")

@@ -266,12 +266,23 @@ def test_observation__does_not_show_controls_or_lapses_of_others(moment: Moment,
     assert (observe(plain)[0, 0] == observe(busy)[0, 0]).all()
 
 
-def test_observation__without_a_blind_spot_check_vehicles_beside_and_behind_are_missing(
-    moment: Moment, world: World
+@pytest.mark.parametrize(
+    ("ahead_m", "right_m", "is_seen"),
+    [
+        (0.5, 3.2, True),  # ahead of the eyes
+        (-0.5, 3.2, False),  # beside: 2.3 m from the flank, which is 0.9 m from the centre
+        (-5.2, 3.2, False),  # 2.9 m behind the rear, which is 2.3 m behind the centre
+        (-5.4, 3.2, True),  # 3.1 m behind it: in the mirrors
+        (-1.0, 4.0, True),  # 3.1 m from the flank: in the mirrors, two lanes away
+        (-4.0, 0.5, True),  # behind: in the inside mirror
+    ],
+)
+def test_observation__without_a_shoulder_glance_vehicles_in_the_blind_spot_are_missing(
+    moment: Moment, world: World, ahead_m: float, right_m: float, is_seen: bool
 ) -> None:
-    players = [car(50.0, unseen_behind_m=1.0), car(50.9, -4.8)]
-    unchecked, checked = moment(world, players), moment(world, [car(50.0), car(50.9, -4.8)])
-    assert seen(unchecked)["other0_seen"] == 0.0
-    assert seen(unchecked)["free_right_m@0m"] == pytest.approx(-4.8 / 8.0, abs=2e-3)
+    other = car(50.0 + ahead_m, -1.6 - right_m)
+    unchecked = moment(world, [car(50.0, sight_cosine=0.0, shoulder_glance=False), other])
+    checked = moment(world, [car(50.0, sight_cosine=0.0), other])
+    assert seen(unchecked)["other0_seen"] == is_seen
     assert seen(checked)["other0_seen"] == 1.0
     assert unchecked.vehicle_clearance_m[0, 0] == checked.vehicle_clearance_m[0, 0]  # contact does not depend on sight

@@ -68,6 +68,9 @@ PER_SECOND = [
     ("acceleration", None, car(50.0, acceleration_mps2=4.0), FAR, -0.16),
     # 0.03711437 1/m * 100 = 3.711437 m/s2 (see test_bicycle): 0.3711437^2
     ("lateral_acceleration", None, car(50.0, steering_rad=-0.1), FAR, -0.13774765),
+    # the right lane of the merge road ends at 90 m: 40 m before it, 1 - 40 / 50 = 0.2; the left one goes on
+    ("lane_end", 50.0, car(50.0, -4.8), FAR, -0.2),
+    ("lane_end", 50.0, car(50.0), FAR, 0.0),
     ("time_pressure", None, car(50.0), FAR, -1.0),
     ("waiting", None, car(50.0, speed_mps=0.0), FAR, -1.0),
     ("waiting", None, car(50.0, speed_mps=0.2), FAR, 0.0),
@@ -123,9 +126,15 @@ def test_event__counts_from_its_limit_on(
         assert value_of(q, term, limit, weight=5.0) == pytest.approx(5.0 * value), number
 
 
+def test_terms__jerk_is_squared_in_units_of_10(moment: Moment, world: World) -> None:
+    # braking 0.4 m/s2 harder than one step before: 4 m/s3 in 0.1 s, (4 / 10)^2
+    q = replace(moment(world, [car(50.0), FAR]), gained_mps2=np.array([[-0.4, 0.0]]))
+    assert value_of(q, "jerk") / world.step_s == pytest.approx(-0.16)
+
+
 def test_terms__are_all_tested_here() -> None:
     events = {"collision", "rail", "goal", "timeout", "red_light", "stop_sign", "yield"}
-    by_hand = {*events, "progress", "gap", *(each[0] for each in PER_SECOND)}
+    by_hand = {*events, "progress", "gap", "jerk", *(each[0] for each in PER_SECOND)}
     assert by_hand == set(TERMS)
 
 

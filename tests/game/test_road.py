@@ -66,7 +66,10 @@ def road_steering_rad(
 ) -> FloatArray:
     """The steering angles that follow the routes, [G, P], of cars on their lines."""
     on_line, limits = np.zeros_like(station_m), np.ones(len(station_m))
-    along = routes.along(station_m, on_line, speed_mps, limit_share=limits, wheelbase_m=wheelbase_m)
+    no_lag_s = np.zeros_like(wheelbase_m)
+    along = routes.along(
+        station_m, on_line, speed_mps, limit_share=limits, wheelbase_m=wheelbase_m, steering_lag_s=no_lag_s
+    )
     return along.road_steering_rad
 
 

@@ -98,7 +98,7 @@ def test_starts__along_the_route_are_a_share_of_the_games(share: float) -> None:
 # --- in the initial states of a scene --------------------------------------------------------------------------------
 
 TEXTING = HumanFactors(
-    attention=Attention(mean_attentive_s=2.0, lapse_s=(1.0, 2.0), crown_steering_rad=0.02),
+    attention=Attention(mean_attentive_s=2.0, lapse_s=(1.0, 2.0)),
     reaction=Reaction(delay_s=(0.2, 0.9)),
 )
 
@@ -113,7 +113,7 @@ def test_initial_state__along_the_route_changes_no_other_draw(merge: OpenScene) 
     moved = [np.isnan(each.position_m).all() for each in along]
     assert 15 < sum(moved) < 45
     for one, other, is_moved in zip(plain, along, moved, strict=True):
-        names = ["present", "unseen_behind_m", "member", "noise", "seed", "signal_place"]
+        names = ["present", "shoulder_glance", "member", "noise", "seed", "signal_place"]
         if not is_moved:
             names += ["x_m", "y_m", "heading_rad", "speed_mps", "position_m", "station_m"]
         for name in names:

@@ -239,7 +239,7 @@ def test_observation__out_of_its_bounds_is_an_error_row_with_entry_and_step(
 ) -> None:
     entry = LAYOUT.index("goal_m")
 
-    def faulty_observe(q: Quantities) -> FloatArray:
+    def faulty_observe(q: Quantities, perceived: object = None) -> FloatArray:
         view = observe(q)
         view[q.state.step == STEP, NON_EGO, entry] = value
         return view
@@ -250,7 +250,7 @@ def test_observation__out_of_its_bounds_is_an_error_row_with_entry_and_step(
 
 
 def test_observation__of_a_reset_is_checked_too(merge: OpenScene, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(harness.environments.arena, "observe", lambda q: observe(q) + np.float32(2.0))
+    monkeypatch.setattr(harness.environments.arena, "observe", lambda q, *perceived: observe(q) + np.float32(2.0))
     assert "in step 0, not from -1 to 1" in error_in(merge)
 
 
@@ -281,7 +281,9 @@ def everywhere(request: pytest.FixtureRequest) -> Quantities:
     size = (np.tile(each, (len(state.step), 1)) for each in (scene.world.length_m, scene.world.width_m))
     poses = (state.x_m, state.y_m, state.heading_rad, state.speed_mps)
     state.station_m, offset = routes.locate(state.x_m, state.y_m, state.station_m)
-    return Quantities(scene.world, state, Bodies(*poses, *size, state.present), np.zeros_like(offset), offset, np.zeros_like(offset))
+    return Quantities(
+        scene.world, state, Bodies(*poses, *size, state.present), np.zeros_like(offset), offset, np.zeros_like(offset)
+    )
 
 
 LOW = FuzzySet(name="low", inputs=(0.0, 1.0), memberships=(1.0, 0.0), value=-1.0)

@@ -37,7 +37,7 @@ from tests.support.bicycle import advance, state_of
 from tests.support.chromium import opener
 from tests.support.tiny import CAREFUL, DISTRACTED, SPEEDY
 
-TEXTING = Attention(mean_attentive_s=4.0, lapse_s=(4.0, 6.0), crown_steering_rad=0.005, bump_steering_sd_rad=0.001)
+TEXTING = Attention(mean_attentive_s=4.0, lapse_s=(4.0, 6.0), bump_steering_sd_rad=0.001)
 
 
 def profile_of(file: Path) -> PersonaProfile:

@@ -23,6 +23,10 @@ def actuators(**changes: float) -> ActuatorLimits:
         "max_steering_rate_radps": 0.8,
         "wheelbase_m": 2.7,
         "max_lateral_mps2": 15.0,
+        "throttle_lag_s": 0.0,  # what is requested occurs at once, unless a test says otherwise
+        "brake_lag_s": 0.0,
+        "steering_lag_s": 0.0,
+        "max_jerk_mps3": 1e6,
         **{name: value for name, value in changes.items() if name != "friction"},
     }
     arrays = {name: np.array([value]) for name, value in values.items()}
