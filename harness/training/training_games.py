@@ -96,7 +96,7 @@ def _start_distribution(spec: TrainingSpec, place: LearningPlace, steps: int) ->
     alone = not any(place.drivers)
     present = [0.0 if alone else 1.0 - spec.alone_share] * len(place.drivers)
     present[place.player] = 1.0
-    # A learner that overlooks a vehicle without harm learns nothing from it. So it trains with blind-spot checks and
+    # A learner that overlooks a vehicle without harm learns nothing from it. So it trains with shoulder glances and
     # without looked-but-failed-to-see errors; its persona's own values apply when it drives. Its other limits
     # (reaction, sight, controls) apply from the start of the training.
     own = spec.persona.human_factors

@@ -97,7 +97,7 @@ citation = "nobody, nowhere"
 [safety.terms]
 vehicle_clearance = {{ weight = {weight}, within_m = 10.0 }}
 """
-BLIND = "[perception]\nno_blind_spot_check_share = 1.0\nunseen_behind_m = 100.0\n"
+BLIND = "[perception]\nrange_m = 0.1\n"
 TRAINING: dict[str, Any] = {
     "steps": 16_384,
     "segment_steps": 16_384,

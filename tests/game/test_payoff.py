@@ -68,9 +68,9 @@ PER_SECOND = [
     ("acceleration", None, car(50.0, acceleration_mps2=4.0), FAR, -0.16),
     # 0.03711437 1/m * 100 = 3.711437 m/s2 (see test_bicycle): 0.3711437^2
     ("lateral_acceleration", None, car(50.0, steering_rad=-0.1), FAR, -0.13774765),
-    # the right lane of the merge road ends at 90 m: 40 m before it, 1 - 40 / 50 = 0.2; the left one goes on
-    ("lane_end", 50.0, car(50.0, -4.8), FAR, -0.2),
-    ("lane_end", 50.0, car(50.0), FAR, 0.0),
+    # the right lane of the merge road ends at 100 m: 50 m before it, 1 - 50 / 100 = 0.5; the left one goes on
+    ("lane_end", 100.0, car(50.0, -4.8), FAR, -0.5),
+    ("lane_end", 100.0, car(50.0), FAR, 0.0),
     ("time_pressure", None, car(50.0), FAR, -1.0),
     ("waiting", None, car(50.0, speed_mps=0.0), FAR, -1.0),
     ("waiting", None, car(50.0, speed_mps=0.2), FAR, 0.0),

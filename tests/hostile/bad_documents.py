@@ -147,11 +147,11 @@ PERSONAS = [
     *bombs(PERSONA),
     *no_numbers(PERSONA, "progress = 1.0", "operational.terms.progress"),
     *no_numbers(PERSONA, "mean_attentive_s = 5.0", "attention.mean_attentive_s"),
-    *no_numbers(PERSONA, "no_blind_spot_check_share = 0.5", "perception.no_blind_spot_check_share"),
+    *no_numbers(PERSONA, "no_shoulder_glance_share = 0.5", "perception.no_shoulder_glance_share"),
     *changed(
         PERSONA,
         *(
-            (f"a perception of {line}", "no_blind_spot_check_share = 0.5", line, said)
+            (f"a perception of {line}", "no_shoulder_glance_share = 0.5", line, said)
             for line, said in {
                 "looked_but_failed_to_see_share = 0.5": ("perception", "noticed_within_m"),
                 "noticed_within_m = 5.0": ("perception", "looked_but_failed_to_see_share"),

@@ -83,7 +83,7 @@ sets = [{ name = "fast", points = [[0.0, 0.0], [0.2, 1.0]], value = 1.0 }]
 mean_attentive_s = 5.0
 lapse_s = [1.0, 2.0]
 [perception]
-no_blind_spot_check_share = 0.5
+no_shoulder_glance_share = 0.5
 """
 
 Spoil = Callable[[Path], object]

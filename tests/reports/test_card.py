@@ -38,10 +38,10 @@ def figures_of(run):
 
 
 def test_portrait__is_who_the_person_is_and_what_it_does_not_see():
-    perception, attention = {"no_blind_spot_check_share": 0.85}, {"lapse_s": [4.0, 6.0], "mean_attentive_s": 4.0}
+    perception, attention = {"no_shoulder_glance_share": 0.85}, {"lapse_s": [4.0, 6.0], "mean_attentive_s": 4.0}
     document = {"description": "In a hurry.", "perception": perception, "attention": attention}
     assert portrait(document).replace(NO_SPACE, " ") == (
-        "In a hurry. It does not check the blind spot in 85 % of drives. "
+        "In a hurry. It does not glance over the shoulder in 85 % of drives. "
         "Its eyes leave the road for 4 to 6 s at a time, about every 9 s."
     )
     assert portrait({"description": "In a hurry.", "perception": None, "attention": None}) == "In a hurry."

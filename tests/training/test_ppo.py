@@ -214,10 +214,10 @@ def test_train__the_learner_checks_its_blind_spot_and_the_opponent_does_not(
 ) -> None:
     sampled = samplings(monkeypatch)
     speedy = read_document(SPEEDY, Persona)
-    share = speedy.human_factors.sight.no_blind_spot_check_share
+    share = speedy.human_factors.sight.no_shoulder_glance_share
     assert share > 0.0
     in_one_go(beside(alone, learner, mixture_of(SumoDriver(), speedy), persona=speedy), tmp_path)
-    shares = [[each.sight.no_blind_spot_check_share for (each,) in starts.human_factors] for starts in sampled]
+    shares = [[each.sight.no_shoulder_glance_share for (each,) in starts.human_factors] for starts in sampled]
     assert shares
     assert all(each[learner] == 0.0 and each[1 - learner] == share for each in shares)
 
