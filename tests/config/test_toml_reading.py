@@ -202,6 +202,7 @@ def test_persona__limits_survive_a_round_trip(write: Write) -> None:
     person = read_document(write(PERSONA + limits), Persona)
     written = person.model_dump(mode="json")
     assert Persona.model_validate(written, strict=False) == person
-    assert person.human_factors.sight == Sight(range_m=50.0, distance_error=0.1)
+    sight = Sight(range_m=50.0, field_of_view_deg=180.0, distance_error=0.1, closing_error_per_s=0.01)
+    assert person.human_factors.sight == sight
     assert person.human_factors.reaction == Reaction(delay_s=(0.2, 0.3))
     assert person.human_factors.actuator_shares == ActuatorShares(braking_share=0.5)

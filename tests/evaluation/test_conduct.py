@@ -20,12 +20,16 @@ LIMIT_MPS = 13.89
 
 
 def car(
-    name: str, x_m: float = 20.0, y_m: FloatArray | float = THROUGH_Y, speed_mps: FloatArray | float = 12.0
+    name: str,
+    x_m: float = 20.0,
+    y_m: FloatArray | float = THROUGH_Y,
+    speed_mps: FloatArray | float = 12.0,
+    steps: int = STEPS,
 ) -> pd.DataFrame:
     """A car that drives for six seconds from a place, straight ahead but for `y_m` in each step."""
-    speed, y = (np.broadcast_to(np.asarray(each, dtype=float), STEPS) for each in (speed_mps, y_m))
+    speed, y = (np.broadcast_to(np.asarray(each, dtype=float), steps) for each in (speed_mps, y_m))
     x = x_m + np.concatenate(([0.0], np.cumsum(speed[1:]) * STEP_S))
-    return pd.DataFrame(rows(name, list(zip(x, y, np.zeros(STEPS), speed, strict=True))))
+    return pd.DataFrame(rows(name, list(zip(x, y, np.zeros(steps), speed, strict=True))))
 
 
 def conduct(scene: OpenScene, *cars: pd.DataFrame, player: str = "ego", **cells: Any) -> dict[str, Any]:
@@ -73,10 +77,13 @@ def test_lateral_wander__is_that_of_keeping_the_lane(merge: OpenScene) -> None:
 
 def test_following_gap__is_the_median_over_the_own_speed_and_such_a_road_is_not_free(merge: OpenScene) -> None:
     length_m = float(merge.world.length_m[0])
-    leader = car("non_ego", x_m=20.0 + length_m + 1.5 * 12.0)
-    row = conduct(merge, car("ego"), leader)
+    leader = {"x_m": 20.0 + length_m + 1.5 * 6.0, "speed_mps": 6.0}
+    row = conduct(merge, car("ego", speed_mps=6.0, steps=170), car("non_ego", **leader, steps=170))
     assert row["following_gap_s"] == pytest.approx(1.5, abs=0.03)
     assert row["free_over_limit_mps"] is None
+    # 15 s behind a vehicle are not yet following
+    row = conduct(merge, car("ego", speed_mps=6.0, steps=150), car("non_ego", **leader, steps=150))
+    assert row["following_gap_s"] is None
 
 
 def test_jerk__is_the_change_of_acceleration_per_second(merge: OpenScene) -> None:

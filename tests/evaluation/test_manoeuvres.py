@@ -380,12 +380,17 @@ class Scripted(Steady):
         return super().decide(games, observation, noise)
 
 
-def test_paper__a_distracted_drift_an_egos_swerve_and_the_rail(merge: OpenScene) -> None:
+def test_paper__a_distracted_drift_an_egos_swerve_and_the_rail(merge: OpenScene, tmp_path: Path) -> None:
     """Figure 4: the non-ego "enters a distracted state as their vehicle is drifting sideways"; the ego "swerves away
     and collides with the guard rail"."""
     drivers = Scripted([0.0] * 30 + [0.9] * 10), Steady()
+    document = read_document(DISTRACTED, Persona)
+    text, bumps = DISTRACTED.read_text(encoding="utf-8"), "bump_steering_sd_rad = "
+    assert f"{bumps}0.0005" in text
+    bumpy = tmp_path / "bumpy.toml"
+    bumpy.write_text(text.replace(f"{bumps}0.0005", f"{bumps}0.006"), encoding="utf-8")
     stories = set()
-    for played in play(arm(merge, *drivers, persona=DISTRACTED), episodes=12):
+    for played in play(arm(merge, *drivers, persona=bumpy), episodes=12):
         assert played.recorded is not None
         cause = cause_of(Course(game=played.recorded))
         if cause is not None:

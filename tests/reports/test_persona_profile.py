@@ -21,12 +21,12 @@ from harness.reports.persona.persona_page import render_profile
 from harness.reports.persona.persona_terminal import show
 from harness.reports.persona.profile import (
     AFTER_A_LAPSE,
-    ALWAYS_CHECKS,
+    ALWAYS_GLANCES,
     ATTENDS,
     COLLISION_IS_FREE,
     DECIDES,
+    IN_A_LAPSE,
     NO_LAPSES,
-    STRAIGHT_WHEEL,
     UNIMPAIRED_IN_TRAINING,
     WANTS,
     PersonaProfile,
@@ -139,12 +139,18 @@ def test_attends__in_words() -> None:
     assert "Eyes off the road 56 % of the time" in text
     assert "lapses of 4 to 6 s, with 4 s of attention between them on average; 6.7 lapses per minute" in text
     assert "Of drives of 60 s, under 1 % have no lapse" in text
-    assert "after 5 s, 5.1 m to the right (standard deviation 0.93 m)" in text
-    assert profile_of(CAREFUL).attends == [NO_LAPSES, ALWAYS_CHECKS]
+    assert "wheelbase drifts in 5 s by 0.46 m (standard deviation)" in text
+    assert profile_of(CAREFUL).attends[:2] == [NO_LAPSES, ALWAYS_GLANCES]
     straight = invented(attention={"mean_attentive_s": 55.0, "lapse_s": [5.0, 5.0]})
     text = " ".join(straight.attends)
     assert "Eyes off the road 8 % of the time, in the long run: lapses of 5 s, with 55 s" in text
-    assert STRAIGHT_WHEEL in text
+    assert "drifts" not in text
+    assert IN_A_LAPSE["released"] in text
+    glances = {"mean_attentive_s": 1.5, "lapse_s": [0.42, 4.0], "lapse_distribution": "lognormal", "controls": "held"}
+    text = " ".join(invented(attention=glances).attends)
+    assert "Eyes off the road 52 % of the time" in text
+    assert "lapses of 1.6 s on average, 0.42 to 4 s in the middle 90 %" in text
+    assert IN_A_LAPSE["held"] in text
 
 
 def test_body__in_words() -> None:
@@ -157,13 +163,14 @@ def test_body__in_words() -> None:
         actuators={"throttle_share": 0.5, "steering_share": 0.8},
         attention={"mean_attentive_s": 5.0, "lapse_s": [1.0, 2.0]},
     )  # fmt: skip
-    assert of.attends[-9:] == [
+    assert of.attends[-10:] == [
         "In 30 % of the drives the person looks but fails to see: a vehicle is noticed within 8 m only.",
+        "The field of view is 180 degrees; mirrors show what is behind it.",
         "Vehicles more than 60 m away are never seen.",
         "Two thirds of the time, a distance of 10 m is perceived as 9.05 to 11.1 m.",  # 10 exp(-0.1) to 10 exp(0.1)
         "At 20 m, the error of closing speeds is 0.4 m/s (standard deviation).",
         "An error of perception lasts for about 20 s.",
-        "A decision takes effect 0.2 to 0.6 s later: at 50 km/h after up to 8.3 m.",
+        "What others do is known 0.2 to 0.6 s later: at 50 km/h after up to 8.3 m.",
         AFTER_A_LAPSE,
         "The person uses 50 % of the acceleration, 80 % of the steering of the car.",
         UNIMPAIRED_IN_TRAINING,
