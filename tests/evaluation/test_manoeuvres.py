@@ -20,7 +20,7 @@ from harness.game.arrays import FloatArray, IntArray
 from harness.road.scene.open_scene import OpenScene
 from tests.support.rollouts import Steady, arm, play
 from tests.support.scenes import LEFT_Y, RIGHT_Y, STRAIGHT, STRAIGHT_NODES, build_scene
-from tests.support.tiny import DISTRACTED
+from tests.support.tiny import PAPER_DISTRACTED
 from tests.support.traces import game, rows
 
 STEP_S = 0.1
@@ -385,7 +385,7 @@ def test_paper__a_distracted_drift_an_egos_swerve_and_the_rail(merge: OpenScene)
     and collides with the guard rail"."""
     drivers = Scripted([0.0] * 30 + [0.9] * 10), Steady()
     stories = set()
-    for played in play(arm(merge, *drivers, persona=DISTRACTED), episodes=12):
+    for played in play(arm(merge, *drivers, persona=PAPER_DISTRACTED), episodes=12):
         assert played.recorded is not None
         cause = cause_of(Course(game=played.recorded))
         if cause is not None:
