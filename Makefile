@@ -3,7 +3,7 @@ PYTHON ?= python3
 # Passed through to the command a target runs, e.g. `make test ARGS="-k payoff"`.
 ARGS ?=
 
-CAMPAIGN := campaigns/merge.toml
+CAMPAIGN := campaigns/paper_merge.toml
 BIN := .venv/bin
 # A process per core, at most four: tests start campaigns that take several cores themselves. `ARGS="-n 0"` is one process.
 PYTEST := $(BIN)/pytest -n auto --maxprocesses 4 --dist worksteal
@@ -22,7 +22,7 @@ install: $(INSTALLED) ## set up .venv from requirements.lock (again only when it
 demo: install ## verify the figures in a few minutes: the campaign's games, played by the shipped policies
 	$(BIN)/harness demo $(ARGS)
 
-campaign: install ## run the paper's campaign: harness campaign campaigns/merge.toml
+campaign: install ## run the paper's campaign: harness campaign campaigns/paper_merge.toml
 	$(BIN)/harness campaign $(CAMPAIGN) $(ARGS) || test $$? -eq 3 # a bound is not kept: the report says which
 
 quick: install ## the same campaign with a budget of minutes: every stage, fewer steps

@@ -37,11 +37,11 @@ from harness.drivers.policy_file import write_policy
 
 _STEPS = 3_000_000
 _WORKERS = 2
-_ARM = "naive_vs_speedy-seed1"
+_ARM = "naive_vs_paper_speedy-seed11"
 
 _DOCUMENT = """name = "benchmark"
 scene = "{scene}"
-personas = ["{speedy}", "{distracted}"]
+personas = ["{paper_speedy}", "{paper_distracted}"]
 [ego]
 persona = "{careful}"
 [training]
@@ -54,7 +54,7 @@ episodes = {episodes}
 
 def write_document(folder: Path, steps: int, episodes: int) -> Path:
     """Write the campaign with trainings of `steps` and arms of `episodes`."""
-    personas = {name: persona_file(name).as_posix() for name in ("careful", "speedy", "distracted")}
+    personas = {name: persona_file(name).as_posix() for name in ("careful", "paper_speedy", "paper_distracted")}
     file = folder / "benchmark.toml"
     text = _DOCUMENT.format(scene=MERGE.as_posix(), steps=steps, episodes=episodes, **personas)
     file.write_text(text, encoding="utf-8")
@@ -169,7 +169,7 @@ def campaign_minutes(budget: Budget, on_progress: OnProgress) -> Measured:
 def assessment_side(timer: LapTimer) -> None:
     """One arm as a stage of a campaign: games, records, traces and manoeuvres."""
     with tempfile.TemporaryDirectory(prefix="benchmark-") as scratch:
-        campaign = open_campaign(REPOSITORY / "campaigns" / "merge.toml")
+        campaign = open_campaign(REPOSITORY / "campaigns" / "paper_merge.toml")
         folder = RunFolder(Path(scratch) / "run")
         folder.claim(campaign.document.name)
         scene = campaign.scene.document

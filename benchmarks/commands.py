@@ -26,7 +26,7 @@ _COMMANDS = {"help_seconds": ["--help"], "check_seconds": ["check", "campaigns/m
 
 _PROGRAM = str(Path(sys.executable).with_name("harness"))
 _CONTROL = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
-_PERSONAS = ("speedy", "distracted", "cautious", "drowsy", "impaired", "late_merger", "tailgater", "careful")
+_PERSONAS = ("speedy", "texting", "cautious", "drowsy", "impaired", "late_merger", "tailgater", "careful")
 _EPISODES = 20
 _MANY_ARMS = """name = "many-arms"
 scene = "{scene}"

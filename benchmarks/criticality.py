@@ -18,7 +18,7 @@ from typing import Any
 
 GAMES, EVERY = 50, 5
 LANES_M = {1: -4.8, 2: -1.6}
-"""Centres of the lanes of networks/merge, which are 3.2 m wide."""
+"""Centres of the lanes of networks/paper_merge, which are 3.2 m wide."""
 EGO, OTHER = 100, 101
 
 

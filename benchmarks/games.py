@@ -18,7 +18,7 @@ from harness.game.seeding import generator_of
 from harness.road.scene.open_scene import OpenScene, open_scene
 
 REPOSITORY = Path(__file__).resolve().parents[1]
-MERGE = REPOSITORY / "networks" / "merge"
+MERGE = REPOSITORY / "networks" / "paper_merge"
 GAMES = 64  # as many as campaigns train on
 _MEAN_ACTION, _DEVIATION = np.array([0.02, 0.0]), np.array([0.1, 0.01])  # of pedals and wheel
 _ACTIONS_KEPT = 509  # a prime, so that no game gets the same noise at the same place again
@@ -62,7 +62,7 @@ class CoastingGames:
     """An arena in which both players' actions come from outside, and every game that ends is reset."""
 
     def __init__(self, scene: OpenScene, games: int, seed: int = 1) -> None:
-        personas = [persona("careful"), persona("distracted")]
+        personas = [persona("careful"), persona("paper_distracted")]
         self.arena = Arena(scene, games, [Seat(driver=None, payoff=each.payoff) for each in personas], seed=seed)
         self._start_distribution = scene.start_distribution([each.human_factors for each in personas], [1.0, 1.0])
         self._auto_reset = AutoReset(self.arena, self._start_distribution, "benchmarks")

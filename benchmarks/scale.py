@@ -19,7 +19,7 @@ from harness.config.campaign import Campaign
 from harness.game.roles import EGO
 
 SCENES, SEEDS, ROUNDS = 12, 5, 4
-PERSONAS = ("careful", "cautious", "speedy", "tailgater", "late_merger", "distracted", "drowsy", "impaired")
+PERSONAS = ("careful", "cautious", "speedy", "tailgater", "late_merger", "texting", "drowsy", "impaired")
 CORES = (2, 64, 1024)
 _KINDS = {
     "naive": "training of the naive ego",
@@ -89,7 +89,7 @@ class Study:
 def study_of(results: Mapping[str, Any]) -> Study:
     """The study, with the times of results. Raises KeyError where they have no campaign."""
     measured = results["details"]["campaign"]
-    paper = _plan(["speedy", "distracted"], seeds=1, rounds=2)
+    paper = _plan(["paper_speedy", "paper_distracted"], seeds=1, rounds=2)
     seconds = {kind: mean(measured["seconds"][stage.id] for stage in paper if _kind(stage) == kind) for kind in _KINDS}
     arms = sum(isinstance(stage, AssessmentStage) for stage in paper)
     planned = _plan(PERSONAS, SEEDS, ROUNDS)

@@ -34,7 +34,7 @@ from harness.training.training_games import LearningPlace, TrainingSpec
 
 _ENDLESS = 1_000_000_000
 _WARM_UP_UPDATES = 3
-_OPPONENT = "speedy"
+_OPPONENT = "paper_speedy"
 
 
 def training_spec(settings: Training) -> TrainingSpec:

@@ -1,6 +1,6 @@
 """Campaigns from Python: `harness.run` carries one out, `harness.load` reads the run folder of one.
 
-results = harness.run("merge-demo")
+results = harness.run("demo")
 results.summary[["arm", "failure_rate"]]
 """
 
@@ -116,7 +116,7 @@ class Results:
         return {card.parent.name: read_policy(card.parent) for card in cards}
 
     def policy(self, stage: str) -> Policy:
-        """The policy of a training, such as "naive-seed1". Raises UsageError if the run has none."""
+        """The policy of a training, such as "naive-seed11". Raises UsageError if the run has none."""
         return read_policy(self.path / "policies" / stage)
 
 

@@ -45,13 +45,13 @@ def shipped_names(kind: Kind) -> list[str]:
 
 
 def shipped_policies() -> list[str]:
-    """The names of the shipped policies, such as `merge/naive-seed1`."""
+    """The names of the shipped policies, such as `paper_merge/naive-seed11`."""
     folder = shipped("policies")
     return sorted(each.parent.relative_to(folder).as_posix() for each in folder.glob("*/*/policy.json"))
 
 
 def is_name(written: str, kind: Kind) -> bool:
-    """Whether a document is named as in `scene = "merge"` or `driver = "merge/naive-seed1"`, not by a path."""
+    """Whether a document is named as in `scene = "merge"` or `driver = "paper_merge/naive-seed11"`, not by a path."""
     parts = written.split("/", 1) if kind == "policies" else [written]  # a folder of policies, and a policy in it
     return all(_NAME.fullmatch(each) for each in parts)
 

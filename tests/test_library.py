@@ -8,6 +8,7 @@ import pytest
 
 import harness
 from harness.evaluation.trace_columns import TRACE_COLUMNS
+from tests.support import shipped
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import BY_SUMO, sumo_run, tables, write_campaign
 from tests.support.tiny import harness as command
@@ -60,9 +61,9 @@ def test_trace__a_published_run_without_traces_is_refused() -> None:
 
 
 def test_policies__are_shown_by_their_names_and_shapes(tmp_path: Path) -> None:
-    (tmp_path / "policies").symlink_to(REPOSITORY / "policies" / "merge")
+    (tmp_path / "policies").symlink_to(shipped.POLICIES)
     policies = harness.Results(tmp_path).policies
-    assert [*policies][:2] == ["distracted-seed1", "naive-seed1"]
-    shown = repr(policies["naive-seed1"])
-    assert shown.startswith("Policy(naive-seed1: actor.0.bias [64], actor.0.weight [64, 98],")
+    assert [*policies] == sorted(shipped.ALL)
+    shown = repr(policies[shipped.NAIVE])
+    assert shown.startswith(f"Policy({shipped.NAIVE}: actor.0.bias [64], actor.0.weight [64, 98],")
     assert len(shown) < 500

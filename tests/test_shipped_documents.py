@@ -45,9 +45,9 @@ def test_missing_document__names_the_nearest() -> None:
 def test_document_at__an_existing_path_wins_and_an_unknown_name_is_refused(tmp_path: Path) -> None:
     assert document_at(tmp_path, "campaigns") == tmp_path
     assert document_at(Path("none.toml"), "campaigns") == Path("none.toml")
-    assert document_at(Path("merge-demo"), "campaigns") == shipped("campaigns") / "merge-demo.toml"
-    with pytest.raises(UsageError, match="there is no campaign 'merge-dem'"):
-        document_at(Path("merge-dem"), "campaigns")
+    assert document_at(Path("demo"), "campaigns") == shipped("campaigns") / "demo.toml"
+    with pytest.raises(UsageError, match="there is no campaign 'dem'"):
+        document_at(Path("dem"), "campaigns")
 
 
 def test_names_in_python__an_unknown_one_is_refused_with_the_nearest() -> None:

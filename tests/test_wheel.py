@@ -19,7 +19,7 @@ import pytest
 
 from harness.shipped_documents import Kind, shipped_names, shipped_policies
 from tests.support.repository import REPOSITORY
-from tests.support.shipped import TWO_GAMES
+from tests.support.shipped import FOLDER, NAIVE_BY_NAME, PERSON_BY_NAME, SPEEDY, TWO_GAMES
 from tests.support.sources import SOURCES, tree_of
 
 if sys.version_info >= (3, 11):
@@ -94,9 +94,10 @@ def test_wheel__has_every_shipped_document_and_is_typed(environment: Path, tmp_p
 
 
 def test_wheel__shipped_policies_have_names(environment: Path, tmp_path: Path) -> None:
-    code = "gymnasium.make('harness:harness/Ego-v0', other='merge/speedy-seed1', other_persona='speedy').reset(seed=1)"
+    other = {"other": PERSON_BY_NAME, "other_persona": SPEEDY}
+    code = f"gymnasium.make('harness:harness/Ego-v0', scene={FOLDER!r}, **{other}).reset(seed=1)"
     python(environment, tmp_path, f"import gymnasium; {code}")
-    campaign = TWO_GAMES.replace("[ego]", '[ego]\ndriver = "merge/naive-seed1"')
+    campaign = TWO_GAMES.replace("[ego]", f'[ego]\ndriver = "{NAIVE_BY_NAME}"')
     (tmp_path / "named.toml").write_text(campaign, encoding="utf-8")
     run(environment, tmp_path, "harness", "check", "named.toml")
 

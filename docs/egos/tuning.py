@@ -1,6 +1,6 @@
 """What reconfiguring an ego has changed, from the tables of a run.
 
-    python docs/egos/tuning.py reports/merge-adas
+    python docs/egos/tuning.py reports/paper_merge-adas
 
 prints a table in Markdown: a row for each person against which the ego was reconfigured, and then one for each of its
 parameters.

@@ -49,8 +49,8 @@ def run(
     for learner in LEARNERS:
         document = {
             "name": f"learning-{learner}",
-            "scene": str(ROOT / "networks" / "merge"),
-            "personas": [str(ROOT / "personas" / "speedy.toml")],
+            "scene": str(ROOT / "networks" / "paper_merge"),
+            "personas": [str(ROOT / "personas" / "paper_speedy.toml")],
             "seeds": list(range(1, seeds + 1)),
             "ego": {"persona": str(ROOT / "personas" / "careful.toml")},
             "training": {"steps": steps, "early_convergence": False, "learner": learner},

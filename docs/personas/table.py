@@ -95,7 +95,7 @@ CHARACTERISTICS: dict[str, Characteristic] = {
         low=-30.0,
         high=0.0,
     ),
-    "distracted": Characteristic(
+    "texting": Characteristic(
         name="mean lapse, alone",
         arm=ALONE,
         measure=lapse_s,

@@ -1,6 +1,6 @@
 """The tables of docs/realism.md: the players of runs beside published figures of people.
 
-    python docs/realism/beside_people.py reports/merge-demo [RUN ...]
+    python docs/realism/beside_people.py reports/demo [RUN ...]
 
 reads `realism.csv` of each run folder.
 """

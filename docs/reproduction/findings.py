@@ -1,6 +1,6 @@
-"""The findings of a run of campaigns/merge-seeds.toml, seed by seed, against the expected ones.
+"""The findings of a run of docs/reproduction/five-seeds.toml, seed by seed, against the expected ones.
 
-    python docs/reproduction/findings.py reports/merge-seeds
+    python docs/reproduction/findings.py reports/five-seeds
 
 prints the table of docs/reproduction.md from the run folder's CSV files. It plays only the games of a
 law-abiding driver in the speedy driver's place: SUMO drives the non-ego against each seed's naive ego, on the speedy
@@ -27,7 +27,7 @@ from harness.drivers.sumo import SumoDriver
 from harness.road.scene.open_scene import open_scene
 
 ROOT = Path(__file__).parents[2]
-PERSONAS = ("speedy", "distracted")
+PERSONAS = ("paper_speedy", "paper_distracted")
 ALPHA = 0.01
 
 
@@ -83,39 +83,39 @@ def findings() -> list[Finding]:
     rows = [
         _failure_rate("naive_alone", "0", lambda rate: rate == 0.0),
         _failure_rate("naive_vs_sumo", "≤ 3 %", lambda rate: rate <= 0.03),
-        _failure_rate("naive_vs_speedy", "≥ 20 %", lambda rate: rate >= 0.20),
+        _failure_rate("naive_vs_paper_speedy", "≥ 20 %", lambda rate: rate >= 0.20),
         Finding(
-            what="naive_vs_speedy: speed against naive_alone",
+            what="naive_vs_paper_speedy: speed against naive_alone",
             bound="lower",
-            value=lambda tables: tables.speed("naive_vs_speedy") / tables.speed("naive_alone") - 1.0,
+            value=lambda tables: tables.speed("naive_vs_paper_speedy") / tables.speed("naive_alone") - 1.0,
             holds=lambda change: change < 0.0,
             form="{:+.1%}",
         ),
-        _failure_rate("retrained_vs_speedy", "≤ 3 %", lambda rate: rate <= 0.03),
+        _failure_rate("retrained_vs_paper_speedy", "≤ 3 %", lambda rate: rate <= 0.03),
         Finding(
-            what="retrained_vs_speedy: speed against naive_alone",
+            what="retrained_vs_paper_speedy: speed against naive_alone",
             bound="within 5 %",
-            value=lambda tables: tables.speed("retrained_vs_speedy") / tables.speed("naive_alone") - 1.0,
+            value=lambda tables: tables.speed("retrained_vs_paper_speedy") / tables.speed("naive_alone") - 1.0,
             holds=lambda change: abs(change) <= 0.05,
             form="{:+.1%}",
         ),
-        _failure_rate("naive_vs_distracted", "≥ 12 %", lambda rate: rate >= 0.12),
-        _failure_rate("retrained_vs_distracted", "≤ 5 %", lambda rate: rate <= 0.05),
+        _failure_rate("naive_vs_paper_distracted", "≥ 12 %", lambda rate: rate >= 0.12),
+        _failure_rate("retrained_vs_paper_distracted", "≤ 5 %", lambda rate: rate <= 0.05),
         *(_failure_rate(f"retrained_alone_{persona}", "0", lambda rate: rate == 0.0) for persona in PERSONAS),
-        _goal_rate("speedy_alone: goal", "≥ 97 %", 0.97),
-        _goal_rate("distracted_alone: goal", "≥ 80 %", 0.80),
-        _goal_rate("naive_vs_speedy: its own goal", "≥ 60 %", 0.60),
+        _goal_rate("paper_speedy_alone: goal", "≥ 97 %", 0.97),
+        _goal_rate("paper_distracted_alone: goal", "≥ 80 %", 0.80),
+        _goal_rate("naive_vs_paper_speedy: its own goal", "≥ 60 %", 0.60),
         Finding(
-            what="speedy_alone: speed against the limit",
+            what="paper_speedy_alone: speed against the limit",
             bound="+5 to +30 %",
-            value=lambda tables: tables.mean("speedy_alone", "non_ego_mean_speed_mps") / tables.limit_mps - 1.0,
+            value=lambda tables: tables.mean("paper_speedy_alone", "non_ego_mean_speed_mps") / tables.limit_mps - 1.0,
             holds=lambda change: 0.05 <= change <= 0.30,
             form="{:+.1%}",
         ),
         Finding(
-            what="naive_vs_speedy: its payoff less a law-abiding driver's",
+            what="naive_vs_paper_speedy: its payoff less a law-abiding driver's",
             bound="> 0",
-            value=lambda tables: tables.mean("naive_vs_speedy", "non_ego_payoff") - tables.lawful_payoff,
+            value=lambda tables: tables.mean("naive_vs_paper_speedy", "non_ego_payoff") - tables.lawful_payoff,
             holds=lambda difference: difference > 0.0,
             form="{:+.1f}",
         ),
@@ -148,7 +148,7 @@ def _significance(question: str, persona: str, column: str, word: str) -> Findin
 
 
 def main(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="The run folder, such as reports/merge-seeds.")],
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="The run folder, such as reports/five-seeds.")],
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Also write the table as CSV.")] = None,
 ) -> None:
     """Print the table of findings as Markdown, a column per training seed."""
@@ -180,8 +180,8 @@ def main(
 
 def _play_lawful_driver(run: Path, seed: int, episodes: int) -> tuple[float, float]:
     """The mean payoff of SUMO's driver in the speedy driver's place, on its terms, and the speed limit in m/s."""
-    scene = open_scene(ROOT / "networks" / "merge")
-    careful, speedy = (read_document(ROOT / "personas" / f"{n}.toml", Persona) for n in ("careful", "speedy"))
+    scene = open_scene(ROOT / "networks" / "paper_merge")
+    careful, speedy = (read_document(ROOT / "personas" / f"{n}.toml", Persona) for n in ("careful", "paper_speedy"))
     naive = LearnedDriver(read_policy(run / "policies" / f"naive-seed{seed}"), careful.decisions == "sampled")
     drivers = (mixture_of(naive, careful), mixture_of(SumoDriver(), speedy))
     arm = SeatedArm(name="lawful", scene=scene, drivers=drivers, seed=seed)

@@ -52,12 +52,12 @@ def more_episodes(run: Annotated[Path, typer.Argument(metavar="RUN", help="The r
     goals = (episodes["non_ego_outcome"] == "goal").groupby([episodes["arm"], episodes["seed"]]).mean()
     games = int(summary["episodes"].max())
     lines = {
-        "naive ego against the distracted driver: failures": failures.loc["naive_vs_distracted"],
-        "retrained ego against the distracted driver: failures": failures.loc["retrained_vs_distracted"],
-        "distracted driver alone: goal reached": goals.loc["distracted_alone"],
+        "naive ego against the distracted driver: failures": failures.loc["naive_vs_paper_distracted"],
+        "retrained ego against the distracted driver: failures": failures.loc["retrained_vs_paper_distracted"],
+        "distracted driver alone: goal reached": goals.loc["paper_distracted_alone"],
         "naive ego alone: failures": failures.loc["naive_alone"],
         "naive ego against SUMO's driver: failures": failures.loc["naive_vs_sumo"],
-        "retrained ego alone: failures": failures.loc["retrained_alone_distracted"],
+        "retrained ego alone: failures": failures.loc["retrained_alone_paper_distracted"],
     }
     rows = [[name, *(f"{of_seed[seed]:.1%}".replace("%", " %") for seed in seeds)] for name, of_seed in lines.items()]
     print(_table([f"{games} episodes of each seed", *(f"seed {seed}" for seed in seeds)], rows))

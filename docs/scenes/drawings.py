@@ -2,7 +2,7 @@
 
     python docs/scenes/drawings.py [SCENE...]
 
-writes docs/scenes/<scene>.png for the scenes that it names, or for every scene in `networks/` but the merge. It needs
+writes docs/scenes/<scene>.png for the scenes that it names, or for every scene in `networks/` but the merges. It needs
 Chromium and the extra `dev`.
 """
 

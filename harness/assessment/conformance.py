@@ -149,7 +149,7 @@ def check_named(written: str, scene: Path, games: int, *, allow_code: bool) -> F
     """
     if written == LEARNED:
         message = f"{LEARNED!r} is trained by a campaign: before the training there is no driver to check"
-        remedy = "name the folder of a trained policy, such as RUN/policies/naive-seed1"
+        remedy = "name the folder of a trained policy, such as RUN/policies/naive-seed11"
         raise UsageError.of("DRIVER", "", message, remedy)
     external = None if written == SUMO else find_driver(written, Path("DRIVER"), key="", allow_code=allow_code)
     folder = scene if scene.exists() else _CHECKOUT / scene

@@ -155,12 +155,12 @@ def campaign(
 def demo(
     out: RunOut = None, jobs: Jobs = None, as_json: AsJson = False, quiet: Quiet = False, verbose: Verbose = False
 ) -> None:
-    """Play the paper's campaign with the shipped policies, in a few minutes: the campaign merge-demo.
+    """Play the paper's campaign with the shipped policies, in a few minutes: the campaign demo.
 
     Bounds that are not kept are shown, but do not change the exit code.
     """
     try:
-        campaign(Path("merge-demo"), out=out, jobs=jobs, as_json=as_json, quiet=quiet, verbose=verbose)
+        campaign(Path("demo"), out=out, jobs=jobs, as_json=as_json, quiet=quiet, verbose=verbose)
     except typer.Exit as ended:
         if ended.exit_code != NOT_ACCEPTED:
             raise

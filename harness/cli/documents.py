@@ -174,7 +174,7 @@ def check_driver(
         typer.Argument(
             metavar="DRIVER",
             help="A driver document, a policy's folder, the name of an installed or shipped driver or of a shipped "
-            "policy (merge/naive-seed1), or sumo.",
+            "policy (paper_merge/naive-seed11), or sumo.",
         ),
     ],
     scene: Annotated[Path, typer.Option(metavar="DIR", help="The scene of the games, a folder or a name.")] = Path(
@@ -204,7 +204,8 @@ def export_policy(
         str,
         typer.Argument(
             metavar="DRIVER",
-            help="A policy's folder, a shipped policy (merge/naive-seed1), or a document of kind stable_baselines3.",
+            help="A policy's folder, a shipped policy (paper_merge/naive-seed11), or a document of kind "
+            "stable_baselines3.",
         ),
     ],
     out: Annotated[Path, typer.Argument(metavar="FILE", help="The new file: .onnx, or .pt for TorchScript.")],

@@ -87,7 +87,7 @@ def regression(
         typer.Option(
             metavar="DRIVER",
             help="The ego: the folder of a policy, a driver document, the name of an installed or shipped driver or of "
-            "a shipped policy (merge/naive-seed1), or sumo.",
+            "a shipped policy (paper_merge/naive-seed11), or sumo.",
         ),
     ],
     junit: Annotated[Path | None, typer.Option(metavar="FILE", help="Also write the results as JUnit XML.")] = None,

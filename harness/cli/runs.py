@@ -97,8 +97,8 @@ def export(
 ) -> None:
     """Export recorded games for other programs. Without a format, OpenSCENARIO and OpenDRIVE are written.
 
-    `harness export reports/merge naive_vs_speedy 3 --openscenario --opendrive game` writes one game,
-    `harness export reports/merge --failures failures` all failures.
+    `harness export reports/demo naive_vs_paper_speedy 3 --openscenario --opendrive game` writes one game,
+    `harness export reports/demo --failures failures` all failures.
     """
     from rich.console import Console
 

@@ -27,7 +27,7 @@ from harness.road.scene.load_check import check_loads
 from harness.road.scene.open_scene import open_scene
 
 _SCRATCH = ".part"
-_PERSONAS = {  # none that lets go of the wheel, as `distracted` does: it leaves every road that bends
+_PERSONAS = {  # none that lets go of the wheel, as `texting` does: it leaves every road that bends
     CandidateKind.MERGE: ("speedy", "late_merger"),
     CandidateKind.LANE_END: ("speedy", "late_merger"),
     CandidateKind.FOLLOWING: ("speedy", "tailgater"),

@@ -36,7 +36,7 @@ class Ego(Document):
 
     driver: DocumentPath = LEARNED
     """`learned`: trained by the campaign. `sumo`: SUMO's own models. Else the folder of a policy, a driver document, or
-    the name of an installed driver, of a shipped one, or of a shipped policy (`merge/naive-seed1`)."""
+    the name of an installed driver, of a shipped one, or of a shipped policy (`paper_merge/naive-seed11`)."""
     persona: DocumentPath = "careful"
     """The persona of the ego, which gives its payoff."""
 

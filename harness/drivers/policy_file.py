@@ -43,7 +43,7 @@ class Policy:
     """Actor and critic as arrays: layers with tanh between them, and the log standard deviation of the actions [2].
 
     >>> import harness
-    >>> policy = harness.read_policy("policies/merge/naive-seed1")
+    >>> policy = harness.read_policy("policies/paper_merge/naive-seed11")
     >>> [weight.shape[1] for weight, bias in policy.layers("actor")][0]
     98
     """
@@ -66,7 +66,7 @@ class LearnedDriver:
     """Drives by a policy: by its most likely action, or by a sample of its distribution.
 
     >>> import harness, numpy as np
-    >>> driver = harness.LearnedDriver(harness.read_policy("policies/merge/naive-seed1"), sampled=False)
+    >>> driver = harness.LearnedDriver(harness.read_policy("policies/paper_merge/naive-seed11"), sampled=False)
     >>> driver.decide(games=np.arange(3), observation=np.zeros((3, 98)), noise=np.zeros((3, 2))).shape
     (3, 2)
     """
@@ -116,7 +116,7 @@ def policy_files(folder: Path) -> tuple[Path, Path]:
 def read_policy(folder: str | Path) -> Policy:
     """Read a policy's folder. Raises UsageError if it is missing, damaged, or was made for other observations.
 
-    >>> read_policy("policies/merge/naive-seed1").card["player"]
+    >>> read_policy("policies/paper_merge/naive-seed11").card["player"]
     'ego'
     """
     card_file, tensor_file = policy_files(Path(folder))

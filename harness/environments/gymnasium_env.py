@@ -103,10 +103,10 @@ class DrivingEnv(LiveSimulation, gymnasium.Env[Any, Any]):
         `player` (a name of the scene: "ego", "non_ego", with more people "non_ego_2" and so on) is the learner; it
         has the payoff and the human factors of `persona`. `other` is the driver of every other player: None (the player
         is alone), "sumo", or what `[ego] driver` of a campaign may be: the folder of a policy, a driver document, the
-        name of a shipped driver, of a shipped policy ("merge/speedy-seed1") or of an installed package. It has the
-        human factors of `other_persona`. Code in files runs only with `allow_code`. Paths are relative to the working
-        directory; scenes and personas also have names, as in a campaign ("merge", "speedy"). Raises UsageError for
-        arguments that are wrong and files that can't be read, SimulationError if SUMO fails.
+        name of a shipped driver, of a shipped policy ("paper_merge/naive-seed11") or of an installed package. It has
+        the human factors of `other_persona`. Code in files runs only with `allow_code`. Paths are relative to the
+        working directory; scenes and personas also have names, as in a campaign ("merge", "speedy"). Raises UsageError
+        for arguments that are wrong and files that can't be read, SimulationError if SUMO fails.
         """
         seating = seating_of(
             scene, player, persona=persona, other=other, other_persona=other_persona, allow_code=allow_code

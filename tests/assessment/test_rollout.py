@@ -21,7 +21,7 @@ from harness.game.arrays import FloatArray, IntArray
 from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.policies import some_policy
 from tests.support.rollouts import Steady, arm, play, records, trace
-from tests.support.tiny import DISTRACTED
+from tests.support.tiny import TEXTING
 
 RANDOM = LearnedDriver(some_policy(), sampled=True)
 MEASURED = [name for name, column in TABLES["episodes"].items() if column.dtype == NUMBER]
@@ -60,7 +60,7 @@ def test_assess__episodes_and_seeds_give_different_games(merge: OpenScene) -> No
 
 def test_assess__an_episode_has_the_same_start_in_every_arm(merge: OpenScene) -> None:
     drivers = [(Steady(), None), (RANDOM, SumoDriver()), (SumoDriver(), RANDOM), (None, RANDOM)]
-    arms = [*(arm(merge, *each) for each in drivers), arm(merge, RANDOM, RANDOM, persona=DISTRACTED)]
+    arms = [*(arm(merge, *each) for each in drivers), arm(merge, RANDOM, RANDOM, persona=TEXTING)]
     starts = []
     for each in arms:
         first = pd.concat([trace(game).query("step == 0") for game in play(each)])
@@ -72,7 +72,7 @@ def test_assess__an_episode_has_the_same_start_in_every_arm(merge: OpenScene) ->
 
 
 def test_assess__lapses_depend_on_the_episode_and_not_on_the_arm(merge: OpenScene) -> None:
-    arms = [play(arm(merge, ego, Steady(), persona=DISTRACTED), 6) for ego in (Steady(), None)]
+    arms = [play(arm(merge, ego, Steady(), persona=TEXTING), 6) for ego in (Steady(), None)]
     lapses = [
         [trace(game).query("player == 'non_ego'").set_index("step")["lapsed"] for game in games] for games in arms
     ]

@@ -11,7 +11,7 @@ from harness.campaign.preflight import QUICK_RESPONSE_STEPS, QUICK_SEGMENT_STEPS
 from harness.drivers.policy_file import Policy, write_policy
 from harness.errors import Problem, UsageError
 from tests.support.policies import some_policy
-from tests.support.tiny import CAREFUL, MERGE, write_campaign, write_persona
+from tests.support.tiny import CAREFUL, PAPER_MERGE, write_campaign, write_persona
 
 
 def problems_of(campaign: Path) -> list[Problem]:
@@ -22,9 +22,10 @@ def problems_of(campaign: Path) -> list[Problem]:
 
 def scene_copy(folder: Path, **edits: tuple[str, str]) -> Path:
     """The scene merge in a folder of its own; `edits` replaces text in its files."""
-    shutil.copytree(MERGE, folder / "merge")
+    shutil.copytree(PAPER_MERGE, folder / "merge")
     for name, (old, new) in edits.items():
-        file = folder / "merge" / {"scene": "scene.toml", "routes": "merge.rou.xml", "net": "merge.net.xml"}[name]
+        files = {"scene": "scene.toml", "routes": "paper_merge.rou.xml", "net": "paper_merge.net.xml"}
+        file = folder / "merge" / files[name]
         text = file.read_text()
         assert old in text
         file.write_text(text.replace(old, new))
@@ -36,17 +37,17 @@ def files_in(folder: Path) -> dict[Path, bytes]:
 
 
 def test_open_campaign__the_papers(repository: Path) -> None:
-    campaign = open_campaign(repository / "campaigns" / "merge.toml")
-    assert [persona.name for persona in campaign.personas] == ["speedy", "distracted"]
+    campaign = open_campaign(repository / "campaigns" / "paper_merge.toml")
+    assert [persona.name for persona in campaign.personas] == ["paper_speedy", "paper_distracted"]
     assert campaign.ego_persona.name == "careful"
     assert campaign.document.training.steps == 3_000_000
-    named = {"merge.toml", "careful.toml", "speedy.toml", "scene.toml", "merge.net.xml"}
+    named = {"paper_merge.toml", "careful.toml", "paper_speedy.toml", "scene.toml", "paper_merge.net.xml"}
     assert {Path(name).name for name in campaign.hashes} >= named
     assert all(len(each) == 64 for each in campaign.hashes.values())
 
 
 def test_open_campaign__quick_is_the_same_with_fewer_steps(repository: Path, tmp_path: Path) -> None:
-    file = repository / "campaigns" / "merge.toml"
+    file = repository / "campaigns" / "paper_merge.toml"
     quick, full = open_campaign(file, quick=True).document, open_campaign(file).document
     assert (quick.training.steps, quick.training.segment_steps) == (QUICK_STEPS, QUICK_SEGMENT_STEPS)
     assert quick.reconfiguration.trials < full.reconfiguration.trials
@@ -72,7 +73,7 @@ def test_open_campaign__names_are_relative_to_the_campaigns_own_file(
     ("file_of_scene", "edit"),
     [
         ("scene.toml", {"scene": ('lane = "approach_1"', 'lane = "approach_9"')}),
-        ("merge.rou.xml", {"routes": ('type="person_car" route="through"', 'type="person_car" route="trough"')}),
+        ("paper_merge.rou.xml", {"routes": ('type="person_car" route="through"', 'type="person_car" route="trough"')}),
     ],
 )
 def test_open_campaign__all_mistakes_are_reported_at_once_and_nothing_is_written(
@@ -117,7 +118,7 @@ def test_open_campaign__the_folder_of_a_policy(tmp_path: Path) -> None:
 
 def test_open_campaign__tells_of_egos_that_learned_in_other_games(tmp_path: Path) -> None:
     card = {"player": "ego", "persona": "hasty", "persona_sha256": "0" * 64, "scene": "merge"}
-    for name, scene in (("mine", "merge"), ("other", "crossing")):
+    for name, scene in (("mine", "paper_merge"), ("other", "crossing")):
         write_policy(Policy(some_policy().tensors, {**card, "scene": scene}), tmp_path / name)
     campaign = write_campaign(
         tmp_path, ego={"driver": "mine", "persona": str(CAREFUL)}, crossplay={"egos": ["other"]}, training=None
@@ -125,7 +126,7 @@ def test_open_campaign__tells_of_egos_that_learned_in_other_games(tmp_path: Path
     persona = "persona hasty, here careful"
     assert open_campaign(campaign).learned_elsewhere == {
         "mine": f"learned in other games: {persona}",
-        "other": f"learned in other games: scene crossing, here merge; {persona}",
+        "other": f"learned in other games: scene crossing, here paper_merge; {persona}",
     }
 
 
@@ -134,4 +135,4 @@ def test_open_campaign__refuses_an_ego_that_learned_with_another_car(tmp_path: P
     write_policy(Policy(some_policy().tensors, {"cars": cars}), tmp_path / "mine")
     (problem,) = problems_of(write_campaign(tmp_path, ego={"driver": "mine", "persona": str(CAREFUL)}, training=None))
     assert (Path(problem.file).name, problem.key) == ("policy.json", "cars")
-    assert "max_braking_mps2 6 m/s², max_steering_rad 0.6 rad, and the ego of scene merge has" in problem.message
+    assert "max_braking_mps2 6 m/s², max_steering_rad 0.6 rad, and the ego of scene paper_merge has" in problem.message

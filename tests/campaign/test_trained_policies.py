@@ -81,4 +81,4 @@ def test_policies__that_learned_in_other_games_are_told_in_one_line(tmp_path: Pa
         write_policy(Policy(policy.tensors, {**policy.card, "scene": "crossing", "step_s": 0.2}), folder)
     ((names, words),) = open_campaign(campaign).learned_elsewhere.items()
     assert sorted(names.split(", ")) == ["anna-seed1", "naive-seed1", "retrained_anna-seed1"]
-    assert words == "learned in other games: scene crossing, here merge; step_s 0.2, here 0.1"
+    assert words == "learned in other games: scene crossing, here paper_merge; step_s 0.2, here 0.1"

@@ -27,6 +27,7 @@ from harness.campaign.preflight import open_campaign
 from harness.campaign.results.results import RunResult
 from harness.campaign.storage.run_folder import RunFolder
 from harness.evaluation.tables import read_csv
+from tests.support.shipped import stage
 from tests.support.tiny import (
     BY_SUMO,
     HARNESS,
@@ -166,7 +167,7 @@ def without_privileges(*arguments: object) -> subprocess.CompletedProcess[str]:
 @pytest.mark.skipif(os.geteuid() == 0 and not shutil.which("setpriv"), reason="root may write everywhere")
 def test_folder__without_permission_is_one_message(tmp_path: Path) -> None:
     campaign, run = untrained_run().with_suffix(".toml"), shutil.copytree(untrained_run(), tmp_path / "run")
-    shutil.rmtree(run / ".stages" / "naive_alone-seed1")  # so that there is something to be done
+    shutil.rmtree(run / ".stages" / stage("naive_alone"))  # so that there is something to be done
     for name in (".", ".stages", "traces"):
         (run / name).chmod(0o555)
         try:

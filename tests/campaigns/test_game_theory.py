@@ -14,7 +14,7 @@ from harness.campaign.execution.player_factory import equilibrium_of
 from harness.campaign.plan.stages import EquilibriumMixture, Trained
 from harness.campaign.storage.run_folder import RunFolder
 from tests.support.repository import REPOSITORY
-from tests.support.tiny import DISTRACTED, SPEEDY, TRAINING, carried_out, finished, numbers
+from tests.support.tiny import SPEEDY, TEXTING, TRAINING, carried_out, finished, numbers
 
 pytestmark = pytest.mark.slow
 
@@ -25,13 +25,13 @@ def arms_race() -> Path:
     """Four rounds against the equilibrium's mixture, with everything else that there is to ask."""
     return finished(
         name="arms_race",
-        personas=[str(SPEEDY), str(DISTRACTED)],
+        personas=[str(SPEEDY), str(TEXTING)],
         training={**TRAINING, "steps": 1024},
         rounds={"count": 4, "against": "equilibrium", "stop_early": False},
         best_response=RESPONSE,
         crossplay={"egos": ["sumo", str(REPOSITORY / "egos/adas.toml")]},
         retraining={"against": ["speedy"]},
-        population=[{"name": "town", "shares": {"speedy": 1.0, "distracted": 3.0}}],
+        population=[{"name": "town", "shares": {"speedy": 1.0, "texting": 3.0}}],
     )
 
 
@@ -53,13 +53,13 @@ def manifest(run: Path) -> dict[str, Any]:
 def test_arms_race__everyone_has_met_everyone_and_who_could_still_gain_was_measured() -> None:
     table = pd.read_csv(arms_race() / "crossplay.csv")
     egos = {"naive", "robust", "retrained_town", "sumo", "adas"}
-    egos |= {f"retrained_{who}{round_}" for who in ("speedy", "distracted") for round_ in ("", "_round4")}
-    non_egos = {f"{who}{round_}" for who in ("speedy", "distracted") for round_ in ("", "_round3")}
+    egos |= {f"retrained_{who}{round_}" for who in ("speedy", "texting") for round_ in ("", "_round4")}
+    non_egos = {f"{who}{round_}" for who in ("speedy", "texting") for round_ in ("", "_round3")}
     assert set(zip(table["ego"], table["non_ego"], strict=True)) == {(ego, other) for ego in egos for other in non_egos}
     assert (table["games"] == 4).all()
     table = pd.read_csv(arms_race() / "gaps.csv")
     assert sorted(zip(table["persona"], table["round"], table["role"], strict=True)) == [
-        (who, 4, role) for who in ("distracted", "speedy") for role in ("ego", "non_ego")
+        (who, 4, role) for who in ("texting", "speedy") for role in ("ego", "non_ego")
     ]
     assert 'id="game"' in (arms_race() / "report.html").read_text(encoding="utf-8")
     printed = (arms_race().parent / "printed").read_text(encoding="utf-8")

@@ -46,7 +46,7 @@ from tests.support.chromium import launched, opener, ready_s, until
 from tests.support.pages import campaign, rendered
 from tests.support.rollouts import Steady, arm, play
 from tests.support.scenes import build_scene, drawn
-from tests.support.tiny import MERGE, SPEEDY
+from tests.support.tiny import PAPER_MERGE, SPEEDY
 
 C_LIBRARY = ctypes.CDLL(None)
 weighing = pytest.mark.skipif(
@@ -97,7 +97,7 @@ class Weight:
 
 def soak() -> Iterator[Weight]:
     """A million game-steps of an arena whose players drive at random, and begin anew wherever a game ends."""
-    scene, persona = open_scene(MERGE), read_document(SPEEDY, Persona)
+    scene, persona = open_scene(PAPER_MERGE), read_document(SPEEDY, Persona)
     arena = Arena(scene, GAMES, [Seat(None, persona.payoff), Seat(None, persona.payoff)])
     chance = np.random.default_rng(1)
     actions = np.clip(chance.normal([0.1, 0.0], [0.4, 0.1], (509, GAMES, 2, 2)), -1.0, 1.0)
@@ -141,7 +141,8 @@ def assessment() -> Iterator[Weight]:
 
 def bare_libsumo() -> Iterator[Weight]:
     """The simulations of so many games, loaded and stepped, without the harness."""
-    options = ["--net-file", str(MERGE / "merge.net.xml"), "--step-length", "0.1", "--no-step-log", "--no-warnings"]
+    net = PAPER_MERGE / "paper_merge.net.xml"
+    options = ["--net-file", str(net), "--step-length", "0.1", "--no-step-log", "--no-warnings"]
     libsumo.start(["sumo", *options])
     for game in range(ASSESSED + 1):
         if game % (ASSESSED // WEIGHED) == 0:

@@ -20,13 +20,15 @@ from harness.campaign.preflight import open_campaign
 from harness.config.driver import read_driver
 from harness.evaluation.tables import read_csv
 from harness.training.parameter_search import read_trials
+from tests.support import shipped
 from tests.support.external_drivers import document, find, problems
 from tests.support.plans import planned
 from tests.support.repository import REPOSITORY
+from tests.support.shipped import PERSON, stage
 from tests.support.tiny import (
     CAREFUL,
-    POLICIES,
-    SPEEDY,
+    PAPER_SPEEDY,
+    SHIPPED,
     begin,
     carried_out,
     end,
@@ -39,13 +41,17 @@ from tests.support.tiny import (
 
 ADAS = REPOSITORY / "egos" / "adas.toml"
 SEARCH = {"trials": 8, "games": 16, "games_at_once": 8}
-STAGE = "reconfigured_speedy-seed1"
+PERSONA = shipped.SPEEDY
+AGAINST, RECONFIGURED, RECONFIGURED_ALONE = (
+    f"{each}_{PERSONA}" for each in ("naive_vs", "reconfigured_vs", "reconfigured_alone")
+)
+STAGE = stage(f"reconfigured_{PERSONA}")
 
 
 def searched(driver: object = ADAS, **changes: Any) -> dict[str, Any]:
     """A campaign that trains nothing, and plays nothing but what is asked for here."""
     ego = {"driver": str(driver), "persona": str(CAREFUL)}
-    return {"training": None, "policies": str(POLICIES), "ego": ego, "reconfiguration": SEARCH, **changes}
+    return {**SHIPPED, "ego": ego, "reconfiguration": SEARCH, **changes}
 
 
 # --- the plan ---
@@ -53,12 +59,13 @@ def searched(driver: object = ADAS, **changes: Any) -> dict[str, Any]:
 
 def test_plan__of_an_ego_with_something_to_tune(tmp_path: Path) -> None:
     trained, _ = planned(tmp_path, **searched(seeds=[1, 7], policies=None))
-    assert {id for id, stage in trained.items() if isinstance(stage, TrainingStage)} == {"speedy-seed1", "speedy-seed7"}
+    trainings = {id for id, stage in trained.items() if isinstance(stage, TrainingStage)}
+    assert trainings == {f"{PERSONA}-seed{seed}" for seed in (1, 7)}
     for seed in (1, 7):
-        search = trained[f"reconfigured_speedy-seed{seed}"]
+        search = trained[f"reconfigured_{PERSONA}-seed{seed}"]
         assert isinstance(search, SearchStage)
-        assert (search.needs, search.reads) == ((f"speedy-seed{seed}",), ())
-        for arm in ("vs_speedy", "alone_speedy"):
+        assert (search.needs, search.reads) == ((f"{PERSONA}-seed{seed}",), ())
+        for arm in (f"vs_{PERSONA}", f"alone_{PERSONA}"):
             stage = trained[f"reconfigured_{arm}-seed{seed}"]
             assert isinstance(stage, AssessmentStage)
             assert search.id in stage.needs
@@ -66,17 +73,17 @@ def test_plan__of_an_ego_with_something_to_tune(tmp_path: Path) -> None:
     assert not [id for id in trained if "retrained" in id]
 
     before, _ = planned(tmp_path, **searched())
-    assert (before[STAGE].needs, before[STAGE].reads) == ((), ("speedy-seed1",))
+    assert (before[STAGE].needs, before[STAGE].reads) == ((), (PERSON,))
     assert not [stage for stage in before.values() if isinstance(stage, TrainingStage)]
 
 
 def test_questions__compare_naive_with_reconfigured(tmp_path: Path) -> None:
     campaign = open_campaign(write_campaign(tmp_path, **searched()))
-    asked = {each.question: (each.baseline, each.treatment) for each in questions(campaign.document, ["speedy"], True)}
-    assert asked == {"RQ1": ("naive_alone", "naive_vs_speedy"), "RQ2": ("naive_vs_speedy", "reconfigured_vs_speedy")}
+    asked = {each.question: (each.baseline, each.treatment) for each in questions(campaign.document, [PERSONA], True)}
+    assert asked == {"RQ1": ("naive_alone", AGAINST), "RQ2": (AGAINST, RECONFIGURED)}
 
 
-SEARCHED = {STAGE, "reconfigured_vs_speedy-seed1", "reconfigured_alone_speedy-seed1"}
+SEARCHED = {STAGE, stage(RECONFIGURED), stage(RECONFIGURED_ALONE)}
 
 
 def with_tunable(text: str, low: float) -> str:
@@ -130,17 +137,17 @@ def test_check__a_table_that_would_be_ignored_or_can_not_be_is_an_error(
 
 
 def test_check__a_persona_may_not_be_called_as_a_search_is(tmp_path: Path) -> None:
-    text = SPEEDY.read_text()
+    text, given = PAPER_SPEEDY.read_text(), f'name = "{PERSONA}"'
     names = ("anna", "reconfigured_anna")
-    files = [document(tmp_path, text.replace('name = "speedy"', f'name = "{name}"'), f"{name}.toml") for name in names]
+    files = [document(tmp_path, text.replace(given, f'name = "{name}"'), f"{name}.toml") for name in names]
     (said,) = problems(write_campaign(tmp_path, **searched(policies=None, personas=files)))
-    assert "two stages would be called 'reconfigured_anna-seed1'" in said
+    assert "two stages would be called 'reconfigured_anna-seed11'" in said
 
 
 def test_check__says_what_will_be_searched(tmp_path: Path) -> None:
     told = harness("check", write_campaign(tmp_path, **searched())).stdout
     assert "Round 2 searches its parameters in 8 trials of 16 games: cruise.speed_share from 0.7 to 1, " in told
-    assert f"  tune   {STAGE}  with speedy-seed1" in told
+    assert f"  tune   {STAGE}  with {PERSON}" in told
     assert "nothing is trained, 6 arms of 4 episodes" in told
 
 
@@ -157,7 +164,7 @@ def test_campaign__every_trial_is_in_the_table_and_the_best_is_chosen(run: Path)
     table = read_csv(run / "reconfiguration.csv")
     searched = read_driver(ADAS).searched  # type: ignore[union-attr]
     assert len(table) == 8 * len(searched)
-    assert set(table["stage"]) == {"reconfigured_speedy"}
+    assert set(table["stage"]) == {f"reconfigured_{PERSONA}"}
     trials = table.drop_duplicates("trial").set_index("trial")
     assert trials["best_payoff"].tolist() == trials["mean_payoff"].cummax().tolist()
     chosen = table[table["chosen"]]
@@ -175,16 +182,14 @@ def test_campaign__every_trial_is_in_the_table_and_the_best_is_chosen(run: Path)
 def test_campaign__naive_and_reconfigured_are_compared_as_naive_and_retrained_are(run: Path) -> None:
     comparisons, episodes = read_csv(run / "comparisons.csv"), read_csv(run / "episodes.csv")
     assert set(episodes["arm"]) == {
-        *("naive_alone", "naive_vs_sumo", "speedy_alone", "naive_vs_speedy"),
-        *("reconfigured_vs_speedy", "reconfigured_alone_speedy"),
+        *("naive_alone", "naive_vs_sumo", f"{PERSONA}_alone", AGAINST),
+        *(RECONFIGURED, RECONFIGURED_ALONE),
     }
     versions = json.loads((run / "manifest.json").read_text())["stages"][STAGE]["versions"]
     assert [set(each) > {"optuna", "libsumo"} for each in versions] == [True]
     (row,) = comparisons.query("question == 'RQ2' and metric == 'mean_speed'").to_dict("records")
     speeds = {arm: games.set_index("episode")["ego_mean_speed_mps"] for arm, games in episodes.groupby("arm")}
-    assert row["mean_difference"] == pytest.approx(
-        (speeds["reconfigured_vs_speedy"] - speeds["naive_vs_speedy"]).mean()
-    )
+    assert row["mean_difference"] == pytest.approx((speeds[RECONFIGURED] - speeds[AGAINST]).mean())
 
 
 @pytest.mark.slow
@@ -198,7 +203,7 @@ def test_campaign__the_report_and_the_terminal_say_reconfigured(run: Path) -> No
     printed = (run.parent / "printed").read_text()
     assert "mixes versions" not in printed
     assert "8 trials in" in printed
-    assert "speedy, RQ2: " in printed
+    assert f"{PERSONA}, RQ2: " in printed
     assert "reconfigured ego" in printed or "Reconfiguration" in printed
 
 
@@ -209,7 +214,7 @@ def test_campaign__the_driver_that_was_found_is_an_ego_that_plays_the_same_games
     driver = document(tmp_path, found.read_text() + "\n[tunable]\n")
     carried_out(write_campaign(tmp_path, **searched(driver, reconfiguration=None)), tmp_path / "run")
     theirs, ours = read_csv(run / "episodes.csv"), read_csv(tmp_path / "run" / "episodes.csv")
-    for now, then in (("naive_vs_speedy", "reconfigured_vs_speedy"), ("naive_alone", "reconfigured_alone_speedy")):
+    for now, then in ((AGAINST, RECONFIGURED), ("naive_alone", RECONFIGURED_ALONE)):
         both = ours[ours["arm"] == now], theirs[theirs["arm"] == then]
         rows = [games.drop(columns=["arm", "persona"]).reset_index(drop=True) for games in both]
         pd.testing.assert_frame_equal(*rows)

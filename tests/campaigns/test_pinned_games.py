@@ -13,18 +13,19 @@ import pytest
 from harness.config.pinned_game import PinnedGame
 from harness.config.toml_reading import read_document
 from harness.evaluation.tables import read_csv
-from tests.support.tiny import POLICIES, carried_out, finished, harness, numbers
+from tests.support import shipped
+from tests.support.shipped import NAIVE, PERSON, POLICIES, RETRAINED, stage
+from tests.support.tiny import SHIPPED, carried_out, finished, harness, numbers
 
-ARM = "naive_vs_speedy"
+ARM = f"naive_vs_{shipped.SPEEDY}"
 
 
 @pytest.fixture(scope="module")
 def run() -> Path:
     """A few games of the shipped policies, with the judgement of their failures."""
     changes: dict[str, Any] = {
+        **SHIPPED,
         "name": "pinned",
-        "policies": str(POLICIES),
-        "training": None,
         "assessment": {"episodes": 8, "reference_drivers": True},
     }
     return finished(**changes)
@@ -73,9 +74,9 @@ def test_preventability__every_failure_is_judged_by_every_driver_and_counted(run
 def test_preventability__running_the_campaign_again_judges_nothing_again(run: Path, tmp_path: Path) -> None:
     again, campaign = shutil.copytree(run, tmp_path / "pinned"), run.with_suffix(".toml")
     assert "Nothing to do" in carried_out(campaign, again)
-    (again / ".stages" / f"{ARM}_preventability-seed1" / "reference_drivers.csv").unlink()
+    (again / ".stages" / stage(f"{ARM}_preventability") / "reference_drivers.csv").unlink()
     printed = carried_out(campaign, again)
-    assert [f"done     {ARM}{stage}-seed1" in printed for stage in ("_preventability", "")] == [True, False]
+    assert [f"done     {stage(ARM + part)}" in printed for part in ("_preventability", "")] == [True, False]
     assert numbers(again) == numbers(run)
 
 
@@ -84,7 +85,7 @@ def test_preventability__running_the_campaign_again_judges_nothing_again(run: Pa
 
 def test_minimise__the_start_lies_between_the_campaigns_and_one_without_a_failure(pinned: Path) -> None:
     game = game_of(pinned)
-    assert (game.arm, game.seed) == (ARM, 1)
+    assert (game.arm, game.seed) == (ARM, shipped.SEED)
     assert game.outcome in ("collision", "rail")
     assert game.no_failure_from is not None
     fails, passes = (pd.Series([*each.position_m, *each.speed_mps]) for each in (game.start, game.no_failure_from))
@@ -119,30 +120,30 @@ def test_minimise__says_what_is_wrong(run: Path, failed: list[int]) -> None:
 
 
 def test_regression__the_naive_ego_fails_and_the_retrained_ego_passes(pinned: Path, tmp_path: Path) -> None:
-    naive = harness("regression", pinned, "--ego", POLICIES / "naive-seed1", "--junit", tmp_path / "junit.xml")
+    naive = harness("regression", pinned, "--ego", POLICIES / NAIVE, "--junit", tmp_path / "junit.xml")
     assert naive.returncode == 3, naive.stdout + naive.stderr
     assert "FAIL" in naive.stdout
     suite = ElementTree.parse(tmp_path / "junit.xml").getroot().find("testsuite")
     assert suite is not None
     assert (suite.get("tests"), suite.get("failures"), suite.get("errors")) == ("1", "1", "0")
-    retrained = harness("regression", pinned, "--ego", POLICIES / "retrained_speedy-seed1")
+    retrained = harness("regression", pinned, "--ego", POLICIES / RETRAINED)
     assert retrained.returncode == 0, retrained.stdout + retrained.stderr
     assert "1 of 1 pinned games pass." in retrained.stdout
 
 
 def test_regression__refuses_what_is_not_the_pinned_game(pinned: Path, tmp_path: Path) -> None:
-    empty = harness("regression", tmp_path, "--ego", POLICIES / "naive-seed1")
+    empty = harness("regression", tmp_path, "--ego", POLICIES / NAIVE)
     assert (empty.returncode, "no pinned game" in empty.stderr) == (2, True)
     changed = tmp_path / "changed"
     shutil.copytree(pinned, changed)
     for name in ("policy.json", "policy.safetensors"):
-        shutil.copy(POLICIES / "naive-seed1" / name, changed / "policies" / "speedy-seed1" / name)
+        shutil.copy(POLICIES / NAIVE / name, changed / "policies" / PERSON / name)
     with (changed / "scene" / "scene.toml").open("a", encoding="utf-8") as scene:
         scene.write("\n# changed\n")
-    done = harness("regression", changed, "--ego", POLICIES / "naive-seed1")
+    done = harness("regression", changed, "--ego", POLICIES / NAIVE)
     assert done.returncode == 2
     assert "is not the scene of this game" in done.stderr
     shutil.copytree(pinned / "scene", changed / "scene", dirs_exist_ok=True)
-    done = harness("regression", changed, "--ego", POLICIES / "naive-seed1")
+    done = harness("regression", changed, "--ego", POLICIES / NAIVE)
     assert done.returncode == 2
     assert "is not the policy of this game" in done.stderr

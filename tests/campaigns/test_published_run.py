@@ -1,4 +1,4 @@
-"""A run folder with only the report and its tables, as reports/merge is published."""
+"""A run folder with only the report and its tables, as reports/paper_merge is published."""
 
 from __future__ import annotations
 
@@ -55,8 +55,8 @@ def test_published__lists_its_games_but_report_and_replay_name_what_is_missing(p
 def test_gitignore__run_folders_are_ignored(repository: Path) -> None:
     if shutil.which("git") is None:
         pytest.skip("git is not installed")
-    run = [f"reports/merge-demo/{name}" for name in ("report.html", "episodes.csv", "traces/naive_alone-seed1.parquet")]
-    command = ["git", "check-ignore", "--no-index", *run, "reports/README.md", "policies/merge/x-seed1/README.md"]
+    run = [f"reports/demo/{name}" for name in ("report.html", "episodes.csv", "traces/naive_alone-seed1.parquet")]
+    command = ["git", "check-ignore", "--no-index", *run, "reports/README.md", "policies/paper_merge/x-seed1/README.md"]
     ignored = subprocess.run(command, cwd=repository, capture_output=True, text=True, check=False)
     if ignored.returncode not in (0, 1):
         pytest.skip("not in a git repository")

@@ -16,12 +16,14 @@ import platformdirs
 import pytest
 
 from harness.evaluation.tables import read_csv
+from tests.support import shipped
+from tests.support.shipped import stage
 from tests.support.tiny import (
     BY_SUMO,
     CAREFUL,
     HARNESS,
     PATIENCE_S,
-    POLICIES,
+    SHIPPED,
     SPEEDY,
     TABLES,
     carried_out,
@@ -134,12 +136,12 @@ def test_numbers__of_an_arm_that_two_workers_play_are_those_of_one(tmp_path: Pat
     (ego / "ego.toml").write_text(
         f'kind = "process"\ncommand = [{sys.executable!r}, "drive.py"]\nstart_deadline_s = {PATIENCE_S}\n'
     )
-    changes: dict[str, Any] = {"training": None, "policies": str(POLICIES), "assessment": {"episodes": 10}}
+    changes: dict[str, Any] = {**SHIPPED, "assessment": {"episodes": 10}}
     campaign = write_campaign(tmp_path, ego={"driver": "ego/ego.toml", "persona": str(CAREFUL)}, **changes)
     (ego / "players").write_text("1")
     carried_out(campaign, runs[0], "--allow-code")
     shutil.copytree(runs[0], runs[1])
-    (runs[1] / ".stages" / "naive_vs_speedy-seed1" / "done.json").unlink()
+    (runs[1] / ".stages" / stage(f"naive_vs_{shipped.SPEEDY}") / "done.json").unlink()
     for each in (ego / "playing").iterdir():
         each.unlink()
     (ego / "players").write_text("2")

@@ -1,4 +1,4 @@
-"""The shipped policies still show what they are shipped to show: played through campaigns/merge-demo.toml."""
+"""The shipped policies still show what they are shipped to show: played through campaigns/demo.toml."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ import pytest
 from harness.campaign.preflight import open_campaign
 from harness.drivers.policy_file import read_policy
 from harness.evaluation.tables import read_csv
+from tests.support import shipped
+from tests.support.shipped import CAMPAIGN, CAMPAIGNS, DEMO, DISTRACTED, PERSONAS, POLICIES, SPEEDY
 from tests.support.tiny import finished
 
 if sys.version_info >= (3, 11):
@@ -24,23 +26,22 @@ EPISODES = 30
 FAILED: dict[str, tuple[float, float]] = {  # arm -> least and greatest share of EPISODES games that the ego fails
     "naive_alone": (0.0, 0.0),
     "naive_vs_sumo": (0.0, 0.05),
-    "naive_vs_speedy": (0.15, 0.45),
-    "retrained_vs_speedy": (0.0, 0.05),
-    "retrained_alone_speedy": (0.0, 0.0),
-    "naive_vs_distracted": (0.05, 0.35),
-    "retrained_vs_distracted": (0.0, 0.1),
-    "retrained_alone_distracted": (0.0, 0.0),
+    f"naive_vs_{SPEEDY}": (0.15, 0.45),
+    f"retrained_vs_{SPEEDY}": (0.0, 0.05),
+    f"retrained_alone_{SPEEDY}": (0.0, 0.0),
+    f"naive_vs_{DISTRACTED}": (0.05, 0.35),
+    f"retrained_vs_{DISTRACTED}": (0.0, 0.1),
+    f"retrained_alone_{DISTRACTED}": (0.0, 0.0),
 }
 
 
 @pytest.fixture(scope="module")
-def demo(repository: Path) -> Path:
+def demo() -> Path:
     """The run folder of the demonstration with fewer episodes; the rest of its document is as it is shipped."""
-    campaigns = repository / "campaigns"
-    document: dict[str, Any] = tomllib.loads((campaigns / "merge-demo.toml").read_text(encoding="utf-8"))
+    document: dict[str, Any] = tomllib.loads(DEMO.read_text(encoding="utf-8"))
     for key in ("scene", "policies"):
-        document[key] = os.path.normpath(campaigns / document[key])
-    document["personas"] = [os.path.normpath(campaigns / each) for each in document["personas"]]
+        document[key] = os.path.normpath(CAMPAIGNS / document[key])
+    document["personas"] = [os.path.normpath(CAMPAIGNS / each) for each in document["personas"]]
     document["assessment"] = {"episodes": EPISODES, "reference_drivers": False}
     del document["acceptance"]
     return finished(**{"training": None, **document})
@@ -63,7 +64,7 @@ def test_shipped_policies__fail_in_every_arm_about_as_often_as_they_did(failed: 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("persona", ["speedy", "distracted"])
+@pytest.mark.parametrize("persona", PERSONAS)
 def test_shipped_policies__each_person_hurts_the_naive_ego_and_retraining_helps(
     persona: str, failed: pd.Series
 ) -> None:
@@ -71,24 +72,36 @@ def test_shipped_policies__each_person_hurts_the_naive_ego_and_retraining_helps(
     assert failed[f"retrained_vs_{persona}"] <= failed[f"naive_vs_{persona}"]
 
 
-def test_demo__is_the_papers_campaign_but_for_its_trainings(repository: Path) -> None:
-    demo, full = (open_campaign(repository / "campaigns" / f"{name}.toml") for name in ("merge-demo", "merge"))
+def test_demo__is_the_papers_campaign_but_for_its_trainings() -> None:
+    demo, full = map(open_campaign, (DEMO, CAMPAIGN))
     told = ("scene", "personas", "seeds", "ego", "assessment")
     assert [getattr(demo.document, each) for each in told] == [getattr(full.document, each) for each in told]
-    assert demo.policies == repository / "policies" / "merge"
+    assert demo.policies == POLICIES
 
 
 def test_five_seeds__are_the_papers_campaign_five_times(repository: Path) -> None:
-    five, one = (open_campaign(repository / "campaigns" / f"{name}.toml").document for name in ("merge-seeds", "merge"))
+    reproduction = repository / "docs" / "reproduction"
+    five, one = (open_campaign(each) for each in (reproduction / "five-seeds.toml", CAMPAIGN))
+    as_one = {"name": one.document.name, "seeds": one.document.seeds, "acceptance": one.document.acceptance}
+    as_one |= {key: getattr(one.document, key) for key in ("scene", "personas")}  # other paths of the same documents
+    assert five.document.model_copy(update=as_one) == one.document
+    assert (five.scene.folder, five.personas) == (one.scene.folder, one.personas)
+    assert five.document.seeds == [11, 12, 13, 14, 15]
+
+
+def test_merge_seeds__are_the_merge_five_times() -> None:
+    five, one = (open_campaign(CAMPAIGNS / f"{name}.toml").document for name in ("merge-seeds", "merge"))
     assert five.model_copy(update={"name": one.name, "seeds": one.seeds, "best_response": None}) == one
-    assert five.seeds == [1, 2, 3, 4, 5]
+    assert five.seeds == [11, 12, 13, 14, 15]
 
 
-def test_shipped_policies__each_has_its_model_card_and_was_trained_on_the_scene(repository: Path) -> None:
-    for folder in sorted((repository / "policies" / "merge").iterdir()):
+def test_shipped_policies__each_has_its_model_card_and_was_trained_on_the_scene() -> None:
+    folders = sorted(POLICIES.iterdir())
+    assert {each.name for each in folders} == shipped.ALL
+    for folder in folders:
         assert {each.name for each in folder.iterdir()} == {"policy.json", "policy.safetensors", "README.md"}
         policy = read_policy(folder)
-        assert (policy.card["stage"], policy.card["scene"]) == (folder.name, "merge")
+        assert (policy.card["stage"], policy.card["scene"]) == (folder.name, shipped.FOLDER)
         card = (folder / "README.md").read_text(encoding="utf-8")
         assert card.startswith(f"# {folder.name}\n")
         assert f"`{policy.card['persona']}`" in card

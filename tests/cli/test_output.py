@@ -15,7 +15,7 @@ from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.run_log import LOG
 from harness.evaluation.tables import read_csv
 from harness.reports.human_ranges import comparable, headline
-from tests.support.tiny import BY_SUMO, MERGE, harness, sumo_run, write_campaign
+from tests.support.tiny import BY_SUMO, PAPER_MERGE, harness, sumo_run, write_campaign
 
 LINE = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ (DEBUG|INFO|WARNING|ERROR) +\S.*|    .*")
 
@@ -40,7 +40,7 @@ def test_check__json_has_the_stages(tmp_path: Path) -> None:
     stages = {each["stage"]: each for each in checked["stages"]}
     assert stages["naive_vs_speedy-seed1"]["after"] == ["speedy-seed1"]
     assert {each["kind"] for each in checked["stages"]} == {"training", "assessment"}
-    assert as_json("check", MERGE)["scene"] == str(MERGE)
+    assert as_json("check", PAPER_MERGE)["scene"] == str(PAPER_MERGE)
 
 
 def test_realism__prints_its_table_and_json_has_every_row(run: Path) -> None:

@@ -26,7 +26,8 @@ from harness.shipped_documents import shipped, shipped_policies
 from tests.support.external_drivers import document, find, install, problems
 from tests.support.policies import some_policy
 from tests.support.repository import REPOSITORY
-from tests.support.tiny import CAREFUL, MERGE, SPEEDY, TRAINING, harness, write_campaign
+from tests.support.shipped import FOLDER, NAIVE, NAIVE_BY_NAME
+from tests.support.tiny import CAREFUL, PAPER_MERGE, SPEEDY, TRAINING, harness, write_campaign
 
 PERL = REPOSITORY / "egos" / "examples" / "process"
 ADAS, RSS = (REPOSITORY / "egos" / f"{name}.toml" for name in ("adas", "rss"))
@@ -81,15 +82,15 @@ def test_find__a_missing_path_gets_the_nearest_as_remedy(tmp_path: Path) -> None
 
 
 def test_find__a_shipped_policy_has_a_name_in_every_folder(tmp_path: Path) -> None:
-    assert find("merge/naive-seed1", tmp_path).place == shipped("policies") / "merge" / "naive-seed1"
-    campaign = open_campaign(write_campaign(tmp_path, ego=ego("merge/naive-seed1")))
-    assert campaign.ego_driver == find("merge/naive-seed1", tmp_path)
-    own = tmp_path / "policies" / "merge" / "naive-seed1"
+    assert find(NAIVE_BY_NAME, tmp_path).place == shipped("policies") / FOLDER / NAIVE
+    campaign = open_campaign(write_campaign(tmp_path, ego=ego(NAIVE_BY_NAME)))
+    assert campaign.ego_driver == find(NAIVE_BY_NAME, tmp_path)
+    own = tmp_path / "policies" / FOLDER / NAIVE
     write_policy(some_policy(), own)
-    assert find("merge/naive-seed1", tmp_path).place == own
+    assert find(NAIVE_BY_NAME, tmp_path).place == own
 
 
-@pytest.mark.parametrize("written", ["merge/naive-seed2", "mine/naive-seed1", "qqq"])
+@pytest.mark.parametrize("written", ["paper_merge/naive-seed2", "mine/naive-seed1", "qqq"])
 def test_find__an_unknown_policy_gets_the_shipped_ones_as_remedy(written: str, tmp_path: Path) -> None:
     told = refusal(written, tmp_path)
     assert all(name in told for name in shipped_policies())
@@ -277,8 +278,8 @@ def test_campaign__with_a_program(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_campaign__with_sumos_models(tmp_path: Path) -> None:
-    shutil.copytree(MERGE, tmp_path / "merge")
-    routes = tmp_path / "merge" / "merge.rou.xml"
+    shutil.copytree(PAPER_MERGE, tmp_path / "merge")
+    routes = tmp_path / "merge" / "paper_merge.rou.xml"
     idm = '<vType id="idm" carFollowModel="IDM" length="4.2" maxSpeed="40" speedFactor="1" speedDev="0"/>'
     routes.write_text(routes.read_text().replace("<route id", f"{idm}\n<route id", 1))
     driver = document(tmp_path, 'kind = "sumo"\nvehicle_type = "idm"', "idm.toml")

@@ -29,14 +29,15 @@ from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support import rollouts
 from tests.support.observations import observation_of
 from tests.support.scenes import build_scene
+from tests.support.tiny import PAPER_MERGE
 
 EGOS = ("adas", "careful_and_competent", "fuzzy", "rss")
 NOTHING = {"kind": "rules", "name": "somebody", "description": "Somebody who drives by rules."}
 
 
 @pytest.fixture(scope="module")
-def scene(repository: Path) -> OpenScene:
-    return open_scene(repository / "networks" / "merge")
+def scene() -> OpenScene:
+    return open_scene(PAPER_MERGE)
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ from harness.errors import UsageError
 from harness.road.scene.open_scene import open_scene
 from tests.support.policies import some_policy
 from tests.support.rollouts import arm, play, trace
-from tests.support.tiny import CAREFUL, MERGE
+from tests.support.tiny import CAREFUL, PAPER_MERGE
 
 FOLLOWING = ("Krauss", "IDM", "EIDM", "ACC", "CACC")
 CHANGING = ("LC2013", "SL2015")
@@ -27,12 +27,12 @@ LIMITS = 'length="4.4" width="1.8" accel="2.6" decel="4.5" maxSpeed="38" speedFa
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The merge with the ego in the lane that ends, and a vehicle type for each pair of models."""
     folder = tmp_path_factory.mktemp("models") / "merge"
-    shutil.copytree(MERGE, folder)
+    shutil.copytree(PAPER_MERGE, folder)
     types = "".join(
         f'<vType id="{following}_{changing}" carFollowModel="{following}" laneChangeModel="{changing}" {LIMITS}/>\n'
         for following, changing in product(FOLLOWING, CHANGING)
     )
-    routes, scene = folder / "merge.rou.xml", folder / "scene.toml"
+    routes, scene = folder / "paper_merge.rou.xml", folder / "scene.toml"
     routes.write_text(routes.read_text().replace("<route id", types + "<route id", 1))
     lanes = scene.read_text().replace('"approach_1"', '"x"').replace('"approach_2"', '"approach_1"')
     scene.write_text(lanes.replace('"x"', '"approach_2"'))

@@ -29,6 +29,7 @@ from harness.sumo.libsumo_simulation import LibsumoSimulation
 from harness.sumo.subprocess_simulation import SubprocessSimulation
 from tests.support.repository import REPOSITORY
 from tests.support.scenes import build_scene
+from tests.support.shipped import FOLDER, PERSON_BY_NAME, SPEEDY
 
 STRAIGHT_ON = np.zeros(2, dtype=np.float32)
 SWERVE = np.array([0.0, 1.0], dtype=np.float32)
@@ -187,7 +188,7 @@ def test_step__needs_a_running_game(opened: Open) -> None:
 
 
 def test_other__a_policy_has_its_personas_attention(opened: Open, policy: Path) -> None:
-    environment = opened(DrivingEnv, other=policy, other_persona="personas/distracted.toml")
+    environment = opened(DrivingEnv, other=policy, other_persona="personas/texting.toml")
     lapsed, speeds = [], []
     for seed in range(5):
         environment.reset(seed=seed)
@@ -234,7 +235,7 @@ def test_names__are_found_from_any_working_directory(
     monkeypatch.chdir(tmp_path)
     opened(DrivingEnv, scene="merge", persona="speedy").reset(seed=1)
     name = "harness:harness/Ego-v0"
-    opened(gymnasium.make, name, other="merge/speedy-seed1", other_persona="speedy").reset(seed=1)
+    opened(gymnasium.make, name, scene=FOLDER, other=PERSON_BY_NAME, other_persona=SPEEDY).reset(seed=1)
 
 
 def test_garbage__an_environment_that_was_not_closed_closes_sumo() -> None:

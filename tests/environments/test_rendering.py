@@ -48,7 +48,10 @@ def test_rgb_array__has_the_player_in_its_middle_to_scale(opened: Open, name: st
 
 
 def test_rgb_array__is_collected_by_gymnasiums_wrapper(opened: Open) -> None:
-    environment = opened(RenderCollection, gymnasium.make("harness/Ego-v0", render_mode="rgb_array"))
+    made = gymnasium.make(
+        "harness/Ego-v0", scene="paper_merge", render_mode="rgb_array"
+    )  # the end of a lane is in sight
+    environment = opened(RenderCollection, made)
     environment.reset(seed=1)
     for _ in range(3):
         environment.step(np.array([1.0, 0.0]))

@@ -34,7 +34,7 @@ READS_PER_FAR_VEHICLE = 0.2  # a step
 FEW, MANY = 4, 16  # games
 VEHICLES = 6  # of background traffic, per game
 STEPS = 20
-PERSONA = REPOSITORY / "personas" / "distracted.toml"
+PERSONA = REPOSITORY / "personas" / "paper_distracted.toml"
 VAN = (
     '<vehicle id="van{k}" type="van" depart="0" departLane="{lane}" departPos="{position_m}" departSpeed="10">'
     '<route edges="road"/></vehicle>'

@@ -20,7 +20,7 @@ from harness.game.arrays import FloatArray, IntArray
 from harness.road.scene.open_scene import OpenScene
 from tests.support.rollouts import Steady, arm, play
 from tests.support.scenes import LEFT_Y, RIGHT_Y, STRAIGHT, STRAIGHT_NODES, build_scene
-from tests.support.tiny import DISTRACTED
+from tests.support.tiny import PAPER_DISTRACTED
 from tests.support.traces import game, rows
 
 STEP_S = 0.1
@@ -384,8 +384,7 @@ def test_paper__a_distracted_drift_an_egos_swerve_and_the_rail(merge: OpenScene,
     """Figure 4: the non-ego "enters a distracted state as their vehicle is drifting sideways"; the ego "swerves away
     and collides with the guard rail"."""
     drivers = Scripted([0.0] * 30 + [0.9] * 10), Steady()
-    document = read_document(DISTRACTED, Persona)
-    text, bumps = DISTRACTED.read_text(encoding="utf-8"), "bump_steering_sd_rad = "
+    text, bumps = PAPER_DISTRACTED.read_text(encoding="utf-8"), "bump_steering_sd_rad = "
     assert f"{bumps}0.0005" in text
     bumpy = tmp_path / "bumpy.toml"
     bumpy.write_text(text.replace(f"{bumps}0.0005", f"{bumps}0.006"), encoding="utf-8")

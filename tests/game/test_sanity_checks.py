@@ -38,7 +38,7 @@ from harness.road.scene.open_scene import OpenScene, open_scene
 from harness.sumo.libsumo_simulation import LibsumoSimulation
 from tests.support.rollouts import Steady, arm, play, records
 from tests.support.scenes import build_scene
-from tests.support.tiny import MERGE, write_campaign
+from tests.support.tiny import PAPER_MERGE, write_campaign
 
 STEP = 5  # the step with a fault
 
@@ -134,7 +134,7 @@ def test_payoff__that_is_not_finite_fails_a_training_stage_by_name(
     campaign = open_campaign(write_campaign(tmp_path))
     folder = RunFolder(tmp_path / "run")
     folder.claim("tiny")
-    folder.keep_scene(MERGE, ("scene.toml", "merge.net.xml", "merge.rou.xml"))
+    folder.keep_scene(PAPER_MERGE, ("scene.toml", "paper_merge.net.xml", "paper_merge.rou.xml"))
     stages = plan(campaign.document, ["speedy"])
     keys = stage_keys(campaign, stages)
     monkeypatch.setattr(Quantities, "lane_offset_m", faulty(Quantities.lane_offset_m, np.nan))
@@ -342,7 +342,7 @@ def test_metric__is_a_number_or_unmeasured_at_every_place_of_every_route(
 @pytest.mark.parametrize("limit", ["0.00", "-5", "nan", "inf"])
 def test_scene__without_a_speed_limit_on_a_players_route_is_refused(limit: str, tmp_path: Path) -> None:
     """Shares of the speed limit are the only quantities that a scene can leave undefined."""
-    net = Path(shutil.copytree(MERGE, tmp_path / "merge")) / "merge.net.xml"
+    net = Path(shutil.copytree(PAPER_MERGE, tmp_path / "merge")) / "paper_merge.net.xml"
     text = re.sub(r'(<lane id="exit_[^>]*?) speed="[^"]*"', rf'\1 speed="{limit}"', net.read_text())
     assert text != net.read_text()
     net.write_text(text)

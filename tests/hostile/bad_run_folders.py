@@ -25,7 +25,7 @@ REPORT, LIST, GAME = ("report", "run"), ("replay", "run", "--list"), ("replay", 
 MANIFEST, TABLE = "run/manifest.json", "run/episodes.csv"
 GAMES, TRACES = "run/.stages/naive_alone-seed1/played.csv", "run/traces/naive_alone-seed1.parquet"
 CURVE, CARD = "run/.stages/speedy-seed1/training.csv", "run/policies/speedy-seed1/policy.json"
-SCENE, NET, ROUTES = "run/scene/scene.toml", "run/scene/merge.net.xml", "run/scene/merge.rou.xml"
+SCENE, NET, ROUTES = "run/scene/scene.toml", "run/scene/paper_merge.net.xml", "run/scene/paper_merge.rou.xml"
 
 
 def to(command: tuple[str, ...], *bad: Bad) -> list[Bad]:
@@ -210,11 +210,11 @@ RUNS = [
         Bad(f"{command[0]}: the run's scene: {way}", sealed(spoil), words, command)
         for command in (REPORT, GAME)
         for way, spoil, words in (
-            ("an entity", edit(NET, "<net ", '<!DOCTYPE n [<!ENTITY x SYSTEM "file:///etc/hostname">]><net '), ("merge.net.xml", "entities")),
-            ("an include", edit(NET, "</net>", '<include href="/etc/passwd"/></net>'), ("merge.net.xml", "include")),
-            ("a device", edit(ROUTES, "<route id", '<vType id="x"><param key="device.ssm.file" value="/tmp/owned"/></vType><route id'), ("merge.rou.xml", "device.ssm.file")),
-            ("a net elsewhere", edit(SCENE, '"merge.net.xml"', '"../manifest.json"'), ("scene.toml", "net")),
-            ("two mistakes", several(edit(SCENE, "friction =", "fricton ="), edit(ROUTES, "</routes>", "<trip/></routes>")), ("merge.rou.xml", "trip")),
+            ("an entity", edit(NET, "<net ", '<!DOCTYPE n [<!ENTITY x SYSTEM "file:///etc/hostname">]><net '), ("paper_merge.net.xml", "entities")),
+            ("an include", edit(NET, "</net>", '<include href="/etc/passwd"/></net>'), ("paper_merge.net.xml", "include")),
+            ("a device", edit(ROUTES, "<route id", '<vType id="x"><param key="device.ssm.file" value="/tmp/owned"/></vType><route id'), ("paper_merge.rou.xml", "device.ssm.file")),
+            ("a net elsewhere", edit(SCENE, '"paper_merge.net.xml"', '"../manifest.json"'), ("scene.toml", "net")),
+            ("two mistakes", several(edit(SCENE, "friction =", "fricton ="), edit(ROUTES, "</routes>", "<trip/></routes>")), ("paper_merge.rou.xml", "trip")),
         )
     ),
 ]

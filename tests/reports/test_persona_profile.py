@@ -35,7 +35,7 @@ from harness.reports.persona.profile import (
 )
 from tests.support.bicycle import advance, state_of
 from tests.support.chromium import opener
-from tests.support.tiny import CAREFUL, DISTRACTED, SPEEDY
+from tests.support.tiny import CAREFUL, PAPER_DISTRACTED, PAPER_SPEEDY
 
 TEXTING = Attention(mean_attentive_s=4.0, lapse_s=(4.0, 6.0), bump_steering_sd_rad=0.001)
 
@@ -90,7 +90,7 @@ def test_profile__has_a_moment_for_every_term() -> None:
 
 
 def test_function__is_that_of_the_game() -> None:
-    (speeding,) = profile_of(SPEEDY).functions
+    (speeding,) = profile_of(PAPER_SPEEDY).functions
     # by hand: half-way between `within` (0) and `over` (1.5), and half-way between `over` and `reckless` (-2)
     assert np.interp([0.075, 0.2, 0.325, 0.45], speeding.inputs, speeding.worth) == pytest.approx(
         [0.75, 1.5, -0.25, -2]
@@ -102,7 +102,7 @@ def test_function__is_that_of_the_game() -> None:
 
 
 def test_wants__compares_a_collision_with_progress() -> None:
-    assert profile_of(SPEEDY).wants == ["A collision costs as much as 125 m of progress earn."]
+    assert profile_of(PAPER_SPEEDY).wants == ["A collision costs as much as 125 m of progress earn."]
     assert invented().wants == [COLLISION_IS_FREE]
     of = invented(human={"weight": 0.0, "terms": {"time_pressure": 1.0}}, safety={"terms": {"collision": 5.0}})
     assert of.wants == [
@@ -135,7 +135,7 @@ def test_drift__is_that_of_the_games_car() -> None:
 
 
 def test_attends__in_words() -> None:
-    text = " ".join(profile_of(DISTRACTED).attends)
+    text = " ".join(profile_of(PAPER_DISTRACTED).attends)
     assert "Eyes off the road 56 % of the time" in text
     assert "lapses of 4 to 6 s, with 4 s of attention between them on average; 6.7 lapses per minute" in text
     assert "Of drives of 60 s, under 1 % have no lapse" in text
@@ -178,7 +178,7 @@ def test_body__in_words() -> None:
 
 
 def test_drives__are_reproducible_and_have_lapses_of_the_documents_length() -> None:
-    first, second = profile_of(DISTRACTED).drives, profile_of(DISTRACTED).drives
+    first, second = profile_of(PAPER_DISTRACTED).drives, profile_of(PAPER_DISTRACTED).drives
     assert first == second
     whole = [end - begin for each in first for begin, end in each.lapses if begin > 0.0 and end < 60.0 - 1e-9]
     assert len(whole) > 20
@@ -190,7 +190,7 @@ def test_drives__are_reproducible_and_have_lapses_of_the_documents_length() -> N
 
 
 @pytest.mark.parametrize("width", [40, 80, 120])
-@pytest.mark.parametrize("file", [SPEEDY, DISTRACTED], ids=["speedy", "distracted"])
+@pytest.mark.parametrize("file", [PAPER_SPEEDY, PAPER_DISTRACTED], ids=["speedy", "distracted"])
 def test_terminal__fits_the_width_and_has_every_part(file: Path, width: int) -> None:
     text = drawn(profile_of(file), width)
     assert "\x1b" not in text
@@ -198,12 +198,14 @@ def test_terminal__fits_the_width_and_has_every_part(file: Path, width: int) -> 
     for words in ("collision", WANTS, ATTENDS, DECIDES):
         assert words in text
     if width == 120:
-        expected = ("drive of 60 s", "0 to 1.6") if file == DISTRACTED else ("over (+1.5)", "speed_over_limit", "+0.7")
+        expected = (
+            ("drive of 60 s", "0 to 1.6") if file == PAPER_DISTRACTED else ("over (+1.5)", "speed_over_limit", "+0.7")
+        )
         assert [words for words in expected if words not in text] == []
 
 
 def test_terminal__is_legible_in_ascii_and_prints_the_text_of_a_document_unchanged() -> None:
-    text = drawn(profile_of(SPEEDY), 80, "ascii")
+    text = drawn(profile_of(PAPER_SPEEDY), 80, "ascii")
     assert [words for words in ("alpha x weight", "-5 once") if words not in text] == []
     assert "?" not in text
     text = drawn(invented(), 120)
@@ -233,7 +235,7 @@ def test_page__is_not_written_over_a_document(tmp_path: Path) -> None:
 
 def test_page__opens_in_dark_and_light_loads_nothing_and_does_not_scroll_sideways(browser: Any, tmp_path: Path) -> None:
     file = tmp_path / "profile.html"
-    fuzzy = read_document(SPEEDY, Persona).model_dump(exclude_none=True)["human"]
+    fuzzy = read_document(PAPER_SPEEDY, Persona).model_dump(exclude_none=True)["human"]
     anna = invented(human=fuzzy, attention={"mean_attentive_s": 5.0, "lapse_s": [4.0, 6.0]})
     write_page(file, render_profile(anna))
     with opener(browser, file) as open_page:

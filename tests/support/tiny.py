@@ -18,14 +18,15 @@ from harness.campaign.storage.run_log import LOG
 from harness.cli.main import CONTINUES
 from harness.config.training import Training
 from harness.errors import NOT_ACCEPTED
+from tests.support import shipped
 from tests.support.forked_command import can_fork, run_forked
 from tests.support.processes import children_of, command_of, in_session
 from tests.support.repository import REPOSITORY
 from tests.support.shared import built_once
 
-MERGE = REPOSITORY / "networks" / "merge"
-POLICIES = REPOSITORY / "policies" / "merge"
-CAREFUL, SPEEDY, DISTRACTED = (REPOSITORY / "personas" / f"{name}.toml" for name in ("careful", "speedy", "distracted"))
+PAPER_MERGE = REPOSITORY / "networks" / "paper_merge"  # a short road: its games take a moment
+CAREFUL, SPEEDY, TEXTING = (REPOSITORY / "personas" / f"{name}.toml" for name in ("careful", "speedy", "texting"))
+PAPER_SPEEDY, PAPER_DISTRACTED = (REPOSITORY / "personas" / f"{name}.toml" for name in shipped.PERSONAS)
 HARNESS = Path(sys.executable).with_name("harness")
 TABLES = ("episodes.csv", "summary.csv", "comparisons.csv")
 PATIENCE_S = 600.0  # a bound on waiting: on a busy machine a second of work takes many; only a hang takes this long
@@ -71,7 +72,7 @@ def write_campaign(folder: Path, **changes: Any) -> Path:
     """A campaign that ends within seconds; `changes` replaces its tables and keys, None leaves one out."""
     document: dict[str, Any] = {
         "name": "tiny",
-        "scene": str(MERGE),
+        "scene": str(PAPER_MERGE),
         "personas": [str(SPEEDY)],
         "ego": {"persona": str(CAREFUL)},
         "training": TRAINING,
@@ -236,5 +237,12 @@ BY_SUMO: dict[str, Any] = {
     "ego": {"driver": "sumo", "persona": str(CAREFUL)},
     "assessment": {"episodes": 2},
 }
-UNTRAINED: dict[str, Any] = {**BY_SUMO, "name": "untrained", "training": None, "policies": str(POLICIES)}
+SHIPPED: dict[str, Any] = {
+    "personas": [str(PAPER_SPEEDY)],
+    "seeds": [shipped.SEED],
+    "policies": str(shipped.POLICIES),
+    "training": None,
+}
+"""The shipped policies: nothing is trained."""
+UNTRAINED: dict[str, Any] = {**BY_SUMO, **SHIPPED, "name": "untrained"}
 """Nothing is trained: workers do not load PyTorch, and the command takes half of the time."""

@@ -26,7 +26,8 @@ from harness.training.paired_rollouts import PairedRollouts
 from harness.training.parameter_search import SearchSpec, Trial, best, propose, read_trials, run_search, write_trials
 from tests.support.external_drivers import document, find
 from tests.support.repository import REPOSITORY
-from tests.support.tiny import CAREFUL, SPEEDY
+from tests.support.shipped import PERSON, POLICIES
+from tests.support.tiny import CAREFUL, PAPER_MERGE, PAPER_SPEEDY
 
 SLOW = 'kind = "rules"\nname = "slow"\ndescription = "Drives at half the limit."\n[cruise]\nspeed_share = 0.5\n'
 SPEED = '[tunable]\n"cruise.speed_share" = [0.4, 1.1]\n'
@@ -34,12 +35,12 @@ SPEED = '[tunable]\n"cruise.speed_share" = [0.4, 1.1]\n'
 
 @pytest.fixture(scope="module")
 def scene() -> OpenScene:
-    return open_scene(REPOSITORY / "networks" / "merge")
+    return open_scene(PAPER_MERGE)
 
 
 def opponent() -> Mixture:
-    policy = read_policy(REPOSITORY / "policies" / "merge" / "speedy-seed1")
-    return mixture_of(LearnedDriver(policy, sampled=False), read_document(SPEEDY, Persona))
+    policy = read_policy(POLICIES / PERSON)
+    return mixture_of(LearnedDriver(policy, sampled=False), read_document(PAPER_SPEEDY, Persona))
 
 
 def search_of(scene: OpenScene, folder: Path, text: str, **settings: Any) -> SearchSpec:

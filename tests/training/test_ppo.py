@@ -30,7 +30,7 @@ from harness.road.scene.open_scene import OpenScene
 from harness.training.checkpoint import Progress
 from harness.training.ppo import TrainingResult, train
 from harness.training.training_games import TrainingSpec
-from tests.support.tiny import DISTRACTED, SPEEDY, settings
+from tests.support.tiny import SPEEDY, TEXTING, settings
 from tests.support.trainings import beside, in_one_go, naive_ego
 
 OTHERS = np.flatnonzero(OF_OTHERS)
@@ -202,8 +202,8 @@ def test_train__lapses_of_attention_start_after_the_attentive_share(
     share: float, lapsing: list[bool], alone: TrainingSpec, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sampled = samplings(monkeypatch)
-    distracted = mixture_of(SumoDriver(), read_document(DISTRACTED, Persona))
-    in_one_go(beside(alone, EGO, distracted, attentive_share=share), tmp_path)
+    texting = mixture_of(SumoDriver(), read_document(TEXTING, Persona))
+    in_one_go(beside(alone, EGO, texting, attentive_share=share), tmp_path)
     factors = [[each for of_player in starts.human_factors for each in of_player] for starts in sampled]
     assert [any(each.attention is not None for each in of_game) for of_game in factors] == lapsing
 

@@ -50,7 +50,7 @@ def ego_learns(campaign: Campaign) -> bool:
 
 def crossplay_name(written: str) -> str:
     """The name of a driver in arms, which are names of files too: that of its document or folder, with "_" for all but
-    letters and digits. `naive_seed1` for `policies/merge/naive-seed1`."""
+    letters and digits. `naive_seed1` for `policies/paper_merge/naive-seed11`."""
     name = PurePath(written).stem if written.endswith(".toml") else PurePath(written).name
     plain = re.sub("[^A-Za-z0-9]+", "_", name)
     return plain if plain[:1].isalpha() else f"ego_{plain}"

@@ -16,7 +16,7 @@ from harness.config.toml_reading import read_document
 from harness.drivers.policy_file import write_policy
 from harness.road.scene.open_scene import open_scene
 from tests.support.policies import some_policy
-from tests.support.tiny import CAREFUL, DISTRACTED, MERGE
+from tests.support.tiny import CAREFUL, PAPER_MERGE, TEXTING
 
 
 @pytest.mark.parametrize("kind", [Trained, TrainedBefore])
@@ -24,16 +24,16 @@ def test_player__with_its_eyes_on_the_road_has_no_lapses_and_is_else_the_same(
     tmp_path: Path, kind: type[Trained] | type[TrainedBefore]
 ) -> None:
     folder = RunFolder(tmp_path)
-    write_policy(some_policy(), folder.policy("distracted-seed1"))
-    persona = read_document(DISTRACTED, Persona)
+    write_policy(some_policy(), folder.policy("texting-seed1"))
+    persona = read_document(TEXTING, Persona)
     context = RunContext(
         folder=folder,
         document=Campaign.model_validate({"name": "a", "scene": "b", "personas": ["c"]}),
         ego_persona=read_document(CAREFUL, Persona),
-        personas={"distracted": persona},
-        policies=folder.policy("distracted-seed1").parent,
+        personas={"texting": persona},
+        policies=folder.policy("texting-seed1").parent,
     )
-    factory = PlayerFactory(context=context, scene=open_scene(MERGE))
+    factory = PlayerFactory(context=context, scene=open_scene(PAPER_MERGE))
 
     def drives(planned: PlannedDriver) -> Persona:
         player = factory.player(planned)
@@ -41,8 +41,8 @@ def test_player__with_its_eyes_on_the_road_has_no_lapses_and_is_else_the_same(
         (member,) = player.members
         return member.persona
 
-    own = kind(stage="distracted-seed1", persona="distracted")
-    attentive = kind(stage="distracted-seed1", persona="distracted", attentive=True)
+    own = kind(stage="texting-seed1", persona="texting")
+    attentive = kind(stage="texting-seed1", persona="texting", attentive=True)
     assert drives(own) == persona
     assert persona.attention is not None
     assert drives(attentive) == persona.model_copy(update={"attention": None})

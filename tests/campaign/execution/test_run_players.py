@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from harness.campaign.execution.run_players import policies_of_run
+from tests.support.shipped import NAIVE, POLICIES
 
 WRITTEN = "../policies/mine"
 
@@ -40,11 +41,10 @@ def test_policies__beside_the_folder_of_the_run_are_found_unless_they_have_chang
     assert policies_of_run(tmp_path / "reports" / "mine", WRITTEN, hashes) is None
 
 
-def test_policies__shipped_ones_are_found_whatever_the_path_was(tmp_path: Path, repository: Path) -> None:
-    shipped = repository / "policies" / "merge"
-    files = sorted(shipped.glob("naive-seed1/policy.*"))
-    hashes = {f"/home/x/naive-seed1/{each.name}": hashlib.sha256(each.read_bytes()).hexdigest() for each in files}
-    assert policies_of_run(tmp_path, "/home/x", hashes) == shipped
+def test_policies__shipped_ones_are_found_whatever_the_path_was(tmp_path: Path) -> None:
+    files = sorted((POLICIES / NAIVE).glob("policy.*"))
+    hashes = {f"/home/x/{NAIVE}/{each.name}": hashlib.sha256(each.read_bytes()).hexdigest() for each in files}
+    assert policies_of_run(tmp_path, "/home/x", hashes) == POLICIES
 
 
 def test_policies__of_a_run_that_read_none_are_none(tmp_path: Path, hashes: dict[str, str]) -> None:

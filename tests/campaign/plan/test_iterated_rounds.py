@@ -259,7 +259,7 @@ def test_matchups__a_response_has_the_pair_and_round_that_it_belongs_to() -> Non
 @pytest.mark.parametrize(
     ("written", "name"),
     [
-        ("../policies/merge/naive-seed1", "naive_seed1"),
+        ("../policies/mine/naive-seed1", "naive_seed1"),
         ("egos/my ego (2).toml", "my_ego_2_"),
         ("egos/v1.2.toml", "v1_2"),
         ("egos/2nd.toml", "ego_2nd"),

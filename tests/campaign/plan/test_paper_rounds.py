@@ -22,7 +22,7 @@ from harness.drivers.policy_file import write_policy
 from harness.game.roles import EGO, NON_EGO
 from tests.support.plans import campaign_of, planned, stages_of
 from tests.support.policies import some_policy
-from tests.support.tiny import CAREFUL, MERGE, SPEEDY, write_persona
+from tests.support.tiny import CAREFUL, PAPER_MERGE, SPEEDY, write_persona
 
 
 @pytest.fixture
@@ -188,10 +188,10 @@ def test_keys__do_not_depend_on_where_the_campaign_lies(tmp_path: Path) -> None:
     assert moved == keys
 
 
-@pytest.mark.parametrize("changed", ["training", "policy", "scene.toml", "merge.net.xml", "merge.rou.xml"])
+@pytest.mark.parametrize("changed", ["training", "policy", "scene.toml", "paper_merge.net.xml", "paper_merge.rou.xml"])
 def test_keys__what_all_stages_rest_on_changes_them_all(changed: str, tmp_path: Path) -> None:
     """Settings of trainings, the policy of an external ego, and every file of the scene."""
-    shutil.copytree(MERGE, tmp_path / "merge")
+    shutil.copytree(PAPER_MERGE, tmp_path / "merge")
     write_policy(some_policy(seed=1), tmp_path / "policy")
     changes: dict[str, Any] = {"scene": "merge"}
     if changed == "policy":

@@ -13,7 +13,7 @@ from harness.campaign.preflight import open_campaign
 from harness.errors import UsageError
 from tests.support.plans import campaign_of, planned, stages_of
 from tests.support.scenes import THREE_PEOPLE, build_scene
-from tests.support.tiny import MERGE, TRAINING, write_campaign, write_persona
+from tests.support.tiny import PAPER_MERGE, TRAINING, write_campaign, write_persona
 
 MIXED = {"name": "mixed", "personas": ["anna", "bert", "anna"]}
 
@@ -77,7 +77,7 @@ def test_keys__of_a_crowd_depend_on_who_is_in_which_place(scene: str, personas: 
             {"training": TRAINING | {"games": 2}},
             "training.games: 2 games at once, and a person learns in 3 places",
         ),
-        ({"scene": str(MERGE), "crowd": [MIXED]}, "crowd[0].personas: 3 personas, and people of the scene: 1"),
+        ({"scene": str(PAPER_MERGE), "crowd": [MIXED]}, "crowd[0].personas: 3 personas, and people of the scene: 1"),
     ],
 )
 def test_campaign__what_does_not_fit_the_people_is_refused(

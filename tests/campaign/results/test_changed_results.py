@@ -22,6 +22,7 @@ from harness.campaign.storage.run_folder import RunFolder
 from harness.errors import UsageError
 from harness.evaluation.tables import read_csv, write_csv
 from harness.library import load
+from tests.support.shipped import SPEEDY, stage
 from tests.support.tiny import harness, untrained_run
 
 pytestmark = pytest.mark.slow
@@ -117,11 +118,12 @@ def test_read__a_campaign_that_has_not_ended_has_no_results_and_then_no_games(
 
 def test_replay__a_game_whose_traces_or_scene_were_changed_is_refused(run: Path) -> None:
     read = partial(played_game, arm="naive_alone", episode=0, seed=None)
-    edited(run / "scene" / "merge.rou.xml", "</routes>", "<!-- mine --></routes>")
+    edited(run / "scene" / "paper_merge.rou.xml", "</routes>", "<!-- mine --></routes>")
     assert "merge.rou.xml: is missing, or is not what" in refusal(read, run)
-    shutil.copy(untrained_run() / "scene" / "merge.rou.xml", run / "scene")
-    shutil.copy(run / "traces" / "speedy_alone-seed1.parquet", run / "traces" / "naive_alone-seed1.parquet")
-    assert "naive_alone-seed1.parquet: is missing, or is not what" in refusal(read, run)
+    shutil.copy(untrained_run() / "scene" / "paper_merge.rou.xml", run / "scene")
+    traces, alone = run / "traces", stage("naive_alone")
+    shutil.copy(traces / f"{stage(SPEEDY + '_alone')}.parquet", traces / f"{alone}.parquet")
+    assert f"{alone}.parquet: is missing, or is not what" in refusal(read, run)
 
 
 def test_minimise__a_run_without_failures_has_nothing_to_pin(run: Path) -> None:

@@ -20,7 +20,7 @@ from harness.evaluation.tables import read_csv, table_of, typed
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import learned_run, sumo_run
 
-ARMS = ("naive_alone", "naive_vs_distracted", "distracted_alone", "retrained_vs_distracted")
+ARMS = ("naive_alone", "naive_vs_paper_distracted", "paper_distracted_alone", "retrained_vs_paper_distracted")
 
 
 def persona(name: str) -> dict[str, Any]:
@@ -29,21 +29,21 @@ def persona(name: str) -> dict[str, Any]:
 
 def entry(name: str, kind: str = "training") -> dict[str, Any]:
     done = {"steps": 1_703_936, "budget_steps": 3_000_000, "stopped": "converged", "rule": "stop when settled"}
-    about = {"kind": kind, "name": name, "persona": "" if name == "naive" else "distracted", "seed": 1}
+    about = {"kind": kind, "name": name, "persona": "" if name == "naive" else "paper_distracted", "seed": 1}
     return {**about, "status": "done", "seconds": 166.5, **(done if kind == "training" else {})}
 
 
 MANIFEST: dict[str, Any] = {
     "name": "merge",
     "quick": False,
-    "campaign": {"name": "merge", "scene": "../networks/merge", "personas": ["distracted.toml"], "seeds": [1]},
-    "personas": ["distracted"],
+    "campaign": {"name": "merge", "scene": "../networks/merge", "personas": ["paper_distracted.toml"], "seeds": [1]},
+    "personas": ["paper_distracted"],
     "ego_persona": persona("careful"),
-    "persona_documents": {"distracted": persona("distracted")},
+    "persona_documents": {"paper_distracted": persona("paper_distracted")},
     "seeds": [1],
     "versions": {"python": "3.11.7", "platform": "Linux-6.1", "harness": "0.1.0", "torch": "2.13.0"},
     "stages": {
-        **{f"{name}-seed1": entry(name) for name in ("naive", "distracted", "retrained_distracted")},
+        **{f"{name}-seed1": entry(name) for name in ("naive", "paper_distracted", "retrained_paper_distracted")},
         **{f"{name}-seed1": entry(name, "assessment") for name in ARMS},
     },
 }
@@ -64,9 +64,9 @@ POLICY: dict[str, Any] = {
 }
 NON_EGO_POLICY = {
     **POLICY,
-    "stage": "distracted-seed1",
+    "stage": "paper_distracted-seed1",
     "player": "non_ego",
-    "persona": "distracted",
+    "persona": "paper_distracted",
     "against": "naive-seed1",
 }
 SUMMARY = typed(
@@ -75,7 +75,7 @@ SUMMARY = typed(
             {"arm": "naive_alone", "seed": 1, "episodes": 100, "errors": 0}
             | {"failure_rate": 0.0, "failure_rate_low": 0.0, "failure_rate_high": 0.0362}
             | {"mean_speed_mps": 13.8, "mean_speed_low_mps": 13.79, "mean_speed_high_mps": 13.81},
-            {"arm": "naive_vs_distracted", "seed": 1, "episodes": 100, "errors": 1}
+            {"arm": "naive_vs_paper_distracted", "seed": 1, "episodes": 100, "errors": 1}
             | {"failure_rate": 0.18, "failure_rate_low": 0.11, "failure_rate_high": 0.269, "mean_speed_mps": 13.78}
             | {"non_ego_goal_rate": 0.75, "non_ego_goal_rate_low": 0.653, "non_ego_goal_rate_high": 0.831}
             | {"non_ego_mean_speed_mps": 11.56},
@@ -85,7 +85,7 @@ SUMMARY = typed(
     )
 )
 
-CRASHES_OF_DISTRACTED = {"player": "distracted", "seed": 1, "figure": CRASHES, "games": 100}
+CRASHES_OF_DISTRACTED = {"player": "paper_distracted", "seed": 1, "figure": CRASHES, "games": 100}
 REALISM = table_of("realism", [{**CRASHES_OF_DISTRACTED, "value": 1_460_064.0, "low": 777_423.0, "high": 2_496_755.0}])
 
 
@@ -95,8 +95,10 @@ def lines(card: str) -> list[str]:
 
 def case(stage: str, rows: str, person: dict[str, Any] | None = None, **policy: Any) -> Any:
     """A card and rows that it has; `person` changes the careful persona of a non-ego, `policy` its policy.json."""
-    documents = {"distracted": persona("distracted") if person is None else {**persona("careful"), **person}}
-    made = {**(NON_EGO_POLICY if stage == "distracted-seed1" else POLICY), **policy}
+    documents = {
+        "paper_distracted": persona("paper_distracted") if person is None else {**persona("careful"), **person}
+    }
+    made = {**(NON_EGO_POLICY if stage == "paper_distracted-seed1" else POLICY), **policy}
     card = "\n".join(lines(model_card(stage, {**MANIFEST, "persona_documents": documents}, SUMMARY, REALISM, made)))
     return card, [row.strip() for row in rows.strip().splitlines()]
 
@@ -138,11 +140,11 @@ OF_NON_EGO = """
     | no lapses in | the first 50 % of the budget |
     5 seconds
     | arm | games | reaches its goal | mean speed (m/s) |
-    | `naive_vs_distracted` | 99 | 75 % (65.3–83.1 %) | 11.56 |
+    | `naive_vs_paper_distracted` | 99 | 75 % (65.3–83.1 %) | 11.56 |
     policies = "policies"    # the path of the parent of this folder
 """
 OF_RETRAINED = """
-    The ego, retrained against the persona `distracted`.
+    The ego, retrained against the persona `paper_distracted`.
     | initial policy | `naive-seed1` |
     | games without the other player | 25 % |
     None yet: no arm with this policy has been assessed.
@@ -161,11 +163,15 @@ OF_SPEEDY = """
         case("naive-seed1", "trained alone on the road, and beside SUMO's own driver.", against="sumo"),
         case("naive-seed1", "it imitated a rule-based driver, shown in 38,400 steps |", training=shown(38_400)),
         case("naive-seed1", "| initial policy | none |", training=shown(0)),
-        case("retrained_distracted-seed1", OF_RETRAINED, against="distracted-seed1", began_from="naive-seed1"),
-        case("distracted-seed1", OF_NON_EGO),
-        case("distracted-seed1", OF_SPEEDY, persona("speedy")),
-        case("distracted-seed1", ", within 0.5 m |\n, after 2 s |\n, within 1.2 s |", {"safety": {"terms": LIMITS}}),
-        case("distracted-seed1", ", from 1.5 m/s |", {"safety": {"terms": LIMITS}}),
+        case(
+            "retrained_paper_distracted-seed1", OF_RETRAINED, against="paper_distracted-seed1", began_from="naive-seed1"
+        ),
+        case("paper_distracted-seed1", OF_NON_EGO),
+        case("paper_distracted-seed1", OF_SPEEDY, persona("paper_speedy")),
+        case(
+            "paper_distracted-seed1", ", within 0.5 m |\n, after 2 s |\n, within 1.2 s |", {"safety": {"terms": LIMITS}}
+        ),
+        case("paper_distracted-seed1", ", from 1.5 m/s |", {"safety": {"terms": LIMITS}}),
     ],
 )
 def test_card__states_its_facts(card: str, rows: list[str]) -> None:
@@ -178,16 +184,16 @@ def test_card__figures_are_those_of_its_own_arms_and_seed() -> None:
     assert card[start + 1 : start + 5] == [
         "| --- | ---: | ---: | ---: |",
         "| `naive_alone` | 100 | 0 % (0–3.6 %) | 13.80 (13.79–13.81) |",
-        "| `naive_vs_distracted` | 99 | 18 % (11–26.9 %) | 13.78 |",
+        "| `naive_vs_paper_distracted` | 99 | 18 % (11–26.9 %) | 13.78 |",
         "",
     ]
 
 
 def test_card__of_a_person_states_its_crashes_alone() -> None:
     crashes = "Alone on the road: 1.46 crashes per km (95 %: 0.777–2.497)."
-    assert crashes in lines(model_card("distracted-seed1", MANIFEST, SUMMARY, REALISM, NON_EGO_POLICY))
+    assert crashes in lines(model_card("paper_distracted-seed1", MANIFEST, SUMMARY, REALISM, NON_EGO_POLICY))
     unmeasured = table_of("realism", [{**CRASHES_OF_DISTRACTED, "value": None}])
-    assert "crashes per km" not in model_card("distracted-seed1", MANIFEST, SUMMARY, unmeasured, NON_EGO_POLICY)
+    assert "crashes per km" not in model_card("paper_distracted-seed1", MANIFEST, SUMMARY, unmeasured, NON_EGO_POLICY)
     assert "crashes per km" not in model_card("naive-seed1", MANIFEST, SUMMARY, REALISM, POLICY)
 
 
@@ -226,9 +232,11 @@ def test_run__has_a_card_beside_each_policy_with_arms_of_its_summary(run: Callab
 
 def test_card__a_description_is_one_line_of_text() -> None:
     description = "In a hurry.\n## Figures\n| failure rate | 0 % |\n<script>alert(1)</script>"
-    documents = {"distracted": {**persona("distracted"), "description": description}}
+    documents = {"paper_distracted": {**persona("paper_distracted"), "description": description}}
     card = lines(
-        model_card("distracted-seed1", {**MANIFEST, "persona_documents": documents}, SUMMARY, REALISM, NON_EGO_POLICY)
+        model_card(
+            "paper_distracted-seed1", {**MANIFEST, "persona_documents": documents}, SUMMARY, REALISM, NON_EGO_POLICY
+        )
     )
     (line,) = [line for line in card if "In a hurry." in line]
     assert line.endswith("In a hurry. ## Figures \\| failure rate \\| 0 % \\| &lt;script>alert(1)&lt;/script>")
