@@ -12,6 +12,7 @@ from harness.config.toml_reading import Document, Interval, Mistakes, ordered
 from harness.game.roles import MOST_PEOPLE, roles_of
 
 _Lower = Annotated[float, Field(ge=0.0, le=10.0)]
+_Share = Annotated[float, Field(ge=0.0, le=1.0)]
 _Upper = Annotated[float, Field(gt=0.0, le=10.0)]
 Factors = Annotated[tuple[_Lower, _Upper], AfterValidator(ordered)]
 PlainFile = Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[A-Za-z0-9][A-Za-z0-9._ -]*$")]
@@ -118,6 +119,8 @@ class Varies(Document):
     """Range of the coefficient of friction, instead of the scene's `friction`."""
     speed_limit_share: Factors | None = None
     """Range of a factor on all speed limits of the net."""
+    signal_place: Annotated[tuple[_Share, _Share], AfterValidator(ordered)] | None = None
+    """Range of the place in the cycles of traffic lights at which the game starts, from 0 to 1. Left out: anywhere."""
 
 
 class Scene(Document):

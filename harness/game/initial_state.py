@@ -106,6 +106,7 @@ class StartDistribution:
     routes: Routes
     friction: tuple[float, float]
     limit_share: tuple[float, float] = (1.0, 1.0)
+    signal_place: tuple[float, float] = (0.0, 1.0)
     along_route_share: float = 0.0
     meet_in_place: bool = False
     obstacles: Obstacles = NO_OBSTACLES
@@ -164,7 +165,7 @@ def draw_initial_state(starts: StartDistribution, *parts: str | int) -> InitialS
         member=tuple(member),
         friction=_varied(starts.friction, "friction", *parts),
         limit_share=_varied(starts.limit_share, "speed limit", *parts),
-        signal_place=float(generator_of(*parts, "signals").random()),
+        signal_place=between(starts.signal_place, generator_of(*parts, "signals").random()),
         parts=parts,
     )
 

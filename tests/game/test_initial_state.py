@@ -123,3 +123,16 @@ def test_seed__is_the_same_in_every_process_and_release() -> None:
     # with any other number, earlier results could not be repeated
     digest = bytes.fromhex("a3c78411fec693c7")
     assert seed_of("assessment", 1, "episode", 7) == int.from_bytes(digest, "little") >> 1
+
+
+def test_start__the_place_in_the_cycle_of_traffic_lights_is_within_its_range(
+    start_distribution: StartDistribution,
+) -> None:
+    narrow = replace(start_distribution, signal_place=(0.28, 0.4))
+    places = [
+        [draw_initial_state(each, "signals", k).signal_place for k in range(200)]
+        for each in (start_distribution, narrow)
+    ]
+    anywhere, within = map(np.array, places)
+    assert anywhere.min() < 0.05 < 0.95 < anywhere.max()
+    assert within == pytest.approx(0.28 + 0.12 * anywhere)  # the same draw

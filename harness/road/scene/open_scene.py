@@ -133,6 +133,7 @@ class OpenScene:
             routes=self.world.road.routes,
             friction=varies.friction or (self.document.friction, self.document.friction),
             limit_share=varies.speed_limit_share or (1.0, 1.0),
+            signal_place=varies.signal_place or (0.0, 1.0),
             along_route_share=along_route_share,
             obstacles=self.obstacles,
         )
