@@ -28,13 +28,21 @@ from libsumo import _libsumo  # the same functions without Python wrappers, for 
 from harness.errors import SimulationError
 from harness.game.arrays import FloatArray
 from harness.game.initial_state import InitialState
+from harness.game.roles import EGO
 from harness.road.demand.route_file import Departure
 from harness.road.demand.warm_up import LANE_CHANGE_S
 from harness.road.net.tiles import tile_offset_m, tile_prefix, tiled_net
 from harness.road.scene.open_scene import OpenScene
 from harness.road.xml.angles import compass_deg_of, heading_rad_of
 from harness.sumo.background_traffic import BackgroundTraffic
-from harness.sumo.insertion import TYPE_XML, Insertion, StandingVehicles, clear_of_obstacles, clear_of_players
+from harness.sumo.insertion import (
+    TYPES_XML,
+    Insertion,
+    StandingVehicles,
+    clear_of_obstacles,
+    clear_of_players,
+    with_follower,
+)
 from harness.sumo.road_signals import Signals, SpeedLimits
 from harness.sumo.simulation import NO_SIGNALS, AtReset, Reading, Simulation, Tiles
 
@@ -67,8 +75,9 @@ class LibsumoSimulation(Simulation):
             raise SimulationError("this process has a libsumo simulation already")
         self._scene, self._games, self._taken_over = scene, games, tuple(taken_over)
         self._recorded = recorded
-        self._players_only = all(self._taken_over) and not scene.has_background_traffic  # SUMO drives no vehicle
-        self._move_options = _ON_ITS_ROUTE if self._players_only else _ON_ANY_LANE
+        alone = all(self._taken_over) and not scene.has_background_traffic  # but for a vehicle that follows the ego
+        self._players_only = alone and not scene.road_behind.lanes  # SUMO drives no vehicle
+        self._move_options = _ON_ITS_ROUTE if alone else _ON_ANY_LANE
         self._half_length = 0.5 * scene.world.length_m
         self._tiles = Tiles(
             prefixes=[tile_prefix(game, games) for game in range(games)],
@@ -77,7 +86,7 @@ class LibsumoSimulation(Simulation):
         )
         folder = tempfile.TemporaryDirectory(prefix="harness-sumo-")
         types = Path(folder.name) / "types.rou.xml"
-        types.write_text(scene.routes.types_xml.replace("</routes>", f"{TYPE_XML}</routes>"), encoding="utf-8")
+        types.write_text(scene.routes.types_xml.replace("</routes>", f"{TYPES_XML}</routes>"), encoding="utf-8")
         document = scene.document
         # SUMO 1.28 may crash (SIGSEGV) if a placed car leaves a junction's lanes and lane changes take time: they take
         # time only if SUMO drives a vehicle.
@@ -142,7 +151,11 @@ class LibsumoSimulation(Simulation):
                 self._remove_vehicle(game, player)
             for player in np.flatnonzero(start.present & ~staying).tolist():
                 self._add_player(game, player, start)
-            departures = clear_of_players(departures, start, self._scene.world.length_m)
+            length_m = self._scene.world.length_m
+            departures = clear_of_players(departures, start, length_m)
+            follower = self._scene.road_behind.follower(start, length_m[EGO])
+            if follower is not None:
+                departures = with_follower(departures, follower, start, length_m)
             if self._standing is not None:
                 self._standing.reset(game, *start.parts)
                 departures = clear_of_obstacles(departures, self._scene.obstacles.boxes(*start.parts))
