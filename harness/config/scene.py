@@ -144,8 +144,8 @@ class Scene(Document):
     """Time for which background traffic has been on the road when a game starts. The game starts at `traffic_begin_s`
     plus this time of the route file."""
     followed_share: float | None = Field(None, ge=0.0, le=1.0)
-    """Share of the games in which a car that SUMO drives follows the ego. Left out: 0.5, or 0 if the ego does not drive or
-    a pedestrian takes part. With a pedestrian only 0 is allowed, because SUMO's driver may run into it."""
+    """Share of the games in which a car that SUMO drives follows the ego. Left out: 0.5, or 0 if the ego does not drive
+    or a pedestrian takes part. With a pedestrian only 0 is allowed, because SUMO's driver may run into it."""
     varies: Varies = Varies()
     goal: Goal | None = None
     """The destination of every player that has none of its own."""
