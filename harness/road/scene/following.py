@@ -25,10 +25,11 @@ FOLLOWER_TYPE = "harness_follower"
 HARDEST_BRAKING_MPS2 = 6.0
 """Of the vehicle behind, in the fuzzy safety model of UN R157."""
 FOLLOWER_XML = (
-    f'<vType id="{FOLLOWER_TYPE}" emergencyDecel="{HARDEST_BRAKING_MPS2}" speedDev="0" '
+    f'<vType id="{FOLLOWER_TYPE}" emergencyDecel="{HARDEST_BRAKING_MPS2}" sigma="0" speedDev="0" '
     'lcStrategic="-1" lcCooperative="0" lcSpeedGain="0" lcKeepRight="0"/>'
 )
-"""SUMO's default driver, who keeps the speed limit and stays in its lane."""
+"""SUMO's default driver, who keeps the speed limit and stays in its lane; without SUMO's random numbers, which the games
+of an arena share."""
 _CLASS = "passenger"
 _CAR_LENGTH_M, _CAR_WIDTH_M = CAR_SIZE_M
 _ON_LANE_M = 2.0  # an ego that is farther from the middle of every lane is followed by nobody
