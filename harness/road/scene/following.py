@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from math import atan2
 
 import shapely
-from sumolib.net import Net
-from sumolib.net.edge import Edge
 from sumolib.net.lane import Lane
 
 from harness.errors import UsageError
@@ -19,6 +16,7 @@ from harness.game.initial_state import InitialState
 from harness.game.roles import EGO
 from harness.road.demand.route_file import CAR_SIZE_M, Departure, Motion, RouteFile, VehicleType
 from harness.road.net import network
+from harness.road.scene.scene_files import SceneFiles
 
 FOLLOWER = "follower"
 FOLLOWER_TYPE = "harness_follower"
@@ -28,8 +26,8 @@ FOLLOWER_XML = (
     f'<vType id="{FOLLOWER_TYPE}" emergencyDecel="{HARDEST_BRAKING_MPS2}" sigma="0" speedDev="0" '
     'lcStrategic="-1" lcCooperative="0" lcSpeedGain="0" lcKeepRight="0"/>'
 )
-"""SUMO's default driver, who keeps the speed limit and stays in its lane; without SUMO's random numbers, which the games
-of an arena share."""
+"""SUMO's default driver, who keeps the speed limit and stays in its lane; without SUMO's random numbers, which the
+games of an arena share."""
 _CLASS = "passenger"
 _CAR_LENGTH_M, _CAR_WIDTH_M = CAR_SIZE_M
 _ON_LANE_M = 2.0  # an ego that is farther from the middle of every lane is followed by nobody
@@ -109,8 +107,10 @@ NO_ROAD = RoadBehind()
 """Where nobody follows the ego."""
 
 
-def road_behind(net: Net, edges: Sequence[Edge]) -> RoadBehind:
-    """The road on which the ego may be followed along the edges of its route; none where a car may not drive."""
+def road_behind(files: SceneFiles) -> RoadBehind:
+    """The road on which the ego may be followed: that of its route. Where a car may not drive on all of it, none is."""
+    net = files.net
+    edges = [net.getEdge(name) for name in files.routes.vehicles[files.document.vehicles[EGO]].edges]
     if not all(edge.allows(_CLASS) for edge in edges):
         return NO_ROAD
     lanes = {lane.getID(): _stretch(lane) for edge in edges for lane in edge.getLanes() if lane.allows(_CLASS)}

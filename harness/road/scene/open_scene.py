@@ -14,7 +14,6 @@ from harness.game.arrays import FloatArray
 from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import StartDistribution
 from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles
-from harness.game.roles import EGO
 from harness.game.seeding import between
 from harness.game.start_range import StartRange
 from harness.game.world import World
@@ -159,12 +158,7 @@ def open_scene(folder: str | Path, ego_type: str | None = None) -> OpenScene:
     places = start_places(files, players)
     obstacles = open_obstacles(files, area, [player.route for player in players])
     rail_lines = tuple(network.rail_lines(net, area, own))
-    followed = NO_ROAD
     routes = with_types(files.routes, obstacles)
-    if document.share_followed:
-        ego_edges = files.routes.vehicles[document.vehicles[EGO]].edges
-        followed = road_behind(net, [net.getEdge(name) for name in ego_edges])
-        routes = with_follower_type(routes)
     background = {name for each in background_departures(files.routes, document.vehicles) for name in each.edges}
     used = [*own, *map(net.getEdge, sorted(background))]  # background traffic needs its whole routes
     scene = OpenScene(
@@ -172,11 +166,11 @@ def open_scene(folder: str | Path, ego_type: str | None = None) -> OpenScene:
         document=document,
         world=world_of(files, players, rail_lines=rail_lines, ground=ground, obstacles=obstacles),
         net_warnings=files.net_warnings,
-        routes=routes,
+        routes=with_follower_type(routes) if document.share_followed else routes,
         obstacles=obstacles,
         lane_strips=strips_near(net, used, obstacles),
         places=places,
-        road_behind=followed,
+        road_behind=road_behind(files) if document.share_followed else NO_ROAD,
         edges=tuple(player.edges for player in players),
         rail_lines=rail_lines,
         junctions=network.junctions_near(net, used),
