@@ -107,6 +107,7 @@ def _one_to_four(people: tuple[Player, ...]) -> tuple[Player, ...]:
     return people
 
 
+_FOLLOWED_SHARE = 0.5
 _COUNTS = Field(json_schema_extra={"minItems": 1, "maxItems": MOST_PEOPLE})  # `_one_to_four` words the mistake
 
 
@@ -145,6 +146,9 @@ class Scene(Document):
     warm_up_s: float = Field(0.0, ge=0.0, le=3600.0)
     """Time for which background traffic has been on the road when a game starts. The game starts at `traffic_begin_s`
     plus this time of the route file."""
+    followed_share: float | None = Field(None, ge=0.0, le=1.0)
+    """Share of the games in which a car that SUMO drives follows the ego. Left out: 0.5, or 0 if the ego does not drive
+    or a pedestrian takes part. With a pedestrian only 0 is allowed, because SUMO's driver may run into it."""
     varies: Varies = Varies()
     goal: Goal | None = None
     """The destination of every player that has none of its own."""
@@ -169,6 +173,14 @@ class Scene(Document):
             raise ValueError("every player has a goal of its own: leave out [goal]")
         return self
 
+    @model_validator(mode="after")
+    def _followed_without_pedestrians(self) -> Scene:
+        walking = [role for role, player in zip(self.roles, self.players, strict=True) if player.on_foot]
+        if self.followed_share and walking:
+            message = f"{walking[0]} is a pedestrian, and the car that follows the ego does not see it"
+            raise Mistakes([("followed_share", message, "give 0, or leave it out")])
+        return self
+
     @classmethod
     def named_location(cls, location: list[Any]) -> list[Any]:
         """Places among people and obstacles are their names."""
@@ -179,6 +191,13 @@ class Scene(Document):
                 return [f"obstacle_{place + 1}", *rest]
             case _:
                 return location
+
+    @property
+    def share_followed(self) -> float:
+        """Share of the games in which somebody follows the ego."""
+        if self.followed_share is not None:
+            return self.followed_share
+        return _FOLLOWED_SHARE if self.ego.drives and not any(player.on_foot for player in self.players) else 0.0
 
     @property
     def players(self) -> tuple[Player, ...]:

@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray
+from harness.game.follower import Follower, draw_follower
 from harness.game.human_factors import (
     NO_LIMITS,
     ActuatorShares,
@@ -28,6 +29,7 @@ from harness.game.human_factors import (
 )
 from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles
 from harness.game.road import Routes
+from harness.game.roles import EGO
 from harness.game.seeding import between, generator_of, parts_of, seed_of
 from harness.game.start_range import StartRange, draw_along_route
 
@@ -72,6 +74,7 @@ class InitialState:
     friction: float
     limit_share: float
     signal_place: float  # in the cycles of traffic lights at which the game starts, from 0 to 1
+    follower: Follower | None  # who follows the ego; None: nobody does
     parts: tuple[str | int, ...]  # parts of the seeds
 
     @property
@@ -92,7 +95,8 @@ class StartDistribution:
     Players that do not take part in every game take part in the same games, as far as their probabilities are equal.
     A player may have several drivers. Each game draws one of them by the `shares`, with its human factors.
     In `along_route_share` of the games, the players start anywhere along their `routes` instead, up to their goals.
-    With `meet_in_place` they do so only in games of a player alone.
+    With `meet_in_place` they do so only in games of a player alone. In `followed_share` of the games, somebody follows
+    the ego.
     """
 
     places: Sequence[StartRange]
@@ -109,6 +113,7 @@ class StartDistribution:
     signal_place: tuple[float, float] = (0.0, 1.0)
     along_route_share: float = 0.0
     meet_in_place: bool = False
+    followed_share: float = 0.0
     obstacles: Obstacles = NO_OBSTACLES
 
 
@@ -166,6 +171,7 @@ def draw_initial_state(starts: StartDistribution, *parts: str | int) -> InitialS
         friction=_varied(starts.friction, "friction", *parts),
         limit_share=_varied(starts.limit_share, "speed limit", *parts),
         signal_place=between(starts.signal_place, generator_of(*parts, "signals").random()),
+        follower=draw_follower(starts.followed_share, *parts) if present[EGO] else None,
         parts=parts,
     )
 

@@ -190,7 +190,7 @@ class BackgroundTraffic:
                 game,
                 sumo_name=sumo_name,
                 name=departure.name,
-                kind=vehicle.getTypeID(sumo_name),
+                kind=departure.vehicle_type,
                 length_m=vehicle.getLength(sumo_name),
                 width_m=vehicle.getWidth(sumo_name),
                 max_speed_mps=vehicle.getMaxSpeed(sumo_name),

@@ -1,4 +1,5 @@
-"""Insertion of vehicles into SUMO's traffic: departures of the route file, and vehicles that stand for obstacles.
+"""Insertion of vehicles into SUMO's traffic: departures of the route file, the vehicle that follows the ego, and
+vehicles that stand for obstacles.
 
 A vehicle of a warm-up is left out if it leaves a player or an obstacle of the game too little room. Where an obstacle
 blocks lanes, one vehicle stands on each, so that the traffic stops behind it or drives round it. Contact is tested
@@ -12,11 +13,13 @@ from collections.abc import Sequence
 import libsumo
 import numpy as np
 
-from harness.game.arrays import FloatArray
+from harness.game.arrays import BoolArray, FloatArray
 from harness.game.geometry import Box, box_distance, boxes_of
 from harness.game.initial_state import InitialState
+from harness.game.roles import EGO
 from harness.road.demand.route_file import SHARE, Departure, Motion
 from harness.road.demand.stops import Stop
+from harness.road.scene.following import FOLLOWER_XML
 from harness.road.scene.open_obstacles import blockages
 from harness.road.scene.open_scene import OpenScene
 from harness.road.xml.xml_file import number_of
@@ -25,8 +28,8 @@ CLEAR_M, CLEAR_S, CLEAR_AROUND_M = 10.0, 2.0, 2.0
 """Room at a player's start: no vehicle on its lane nearer than the first or than the way that the one behind drives in
 the second, and none nearer than the third anywhere."""
 OBSTACLE_TYPE = "harness_obstacle"
-TYPE_XML = f'<vType id="{OBSTACLE_TYPE}" vClass="ignoring" minGap="0"/>'
-"""The type of vehicles that stand for obstacles: no lane's permissions exclude it."""
+TYPES_XML = f'<vType id="{OBSTACLE_TYPE}" vClass="ignoring" minGap="0"/>{FOLLOWER_XML}'
+"""The types of vehicles that stand for obstacles, which no lane's permissions exclude, and of the ego's follower."""
 
 _PARKING = 1  # a flag of setStop: the vehicle leaves the lane while it stands
 _LANE_M = 3.0
@@ -87,7 +90,10 @@ class Insertion:
             libsumo.vehicle.setSpeedFactor(name, departure.speed_factor)
         if motion is not None:  # at once: SUMO would wait for more room than cars leave one another
             libsumo.vehicle.moveTo(name, in_tile(prefix, departure.lane), float(departure.position))
-            libsumo.vehicle.setPreviousSpeed(name, motion.speed_mps)
+            libsumo.vehicle.setPreviousSpeed(name, motion.speed_mps, 0.0)
+        if departure.follower is not None:
+            libsumo.vehicle.setTau(name, departure.follower.time_gap_s)
+            libsumo.vehicle.setActionStepLength(name, departure.follower.reaction_s)
         for stop in departure.stops:
             _add_stop(prefix, name, stop, departure.depart_s)
 
@@ -164,10 +170,26 @@ def clear_of_players(departures: Sequence[Departure], start: InitialState, lengt
 
     `length_m` [P] are the players' lengths. Players that take no part count too: arms have the same traffic.
     """
-    return [each for each in departures if each.motion is None or not _is_near(each.motion, start, length_m)]
+    return [each for each in departures if each.motion is None or not _near(each.motion, start, length_m).any()]
 
 
-def _is_near(motion: Motion, start: InitialState, length_m: FloatArray) -> bool:
+def with_follower(
+    departures: Sequence[Departure], follower: Departure, start: InitialState, length_m: FloatArray
+) -> list[Departure]:
+    """The departures with the vehicle that follows the ego, and without vehicles of the warm-up in its place.
+
+    Where a person starts in its place, nobody follows.
+    """
+    assert follower.motion is not None, "it drives already"
+    if np.delete(_near(follower.motion, start, length_m), EGO).any():
+        return list(departures)
+    way = _way(follower.motion)
+    free = [each for each in departures if each.motion is None or box_distance(_way(each.motion), way) > 0.0]
+    return [follower, *free]
+
+
+def _near(motion: Motion, start: InitialState, length_m: FloatArray) -> BoolArray:
+    """[P] the players that start near a vehicle that drives already."""
     dx = motion.x_m - 0.5 * motion.length_m * np.cos(motion.heading_rad) - start.x_m
     dy = motion.y_m - 0.5 * motion.length_m * np.sin(motion.heading_rad) - start.y_m
     cos, sin = np.cos(start.heading_rad), np.sin(start.heading_rad)
@@ -175,7 +197,8 @@ def _is_near(motion: Motion, start: InitialState, length_m: FloatArray) -> bool:
     bodies = 0.5 * (motion.length_m + length_m)
     behind_mps = np.where(ahead > 0.0, start.speed_mps, motion.speed_mps)
     on_lane = (beside < _LANE_M) & (np.abs(ahead) - bodies < np.maximum(CLEAR_M, CLEAR_S * behind_mps))
-    return bool((on_lane | (np.hypot(dx, dy) - bodies < CLEAR_AROUND_M)).any())
+    near: BoolArray = on_lane | (np.hypot(dx, dy) - bodies < CLEAR_AROUND_M)
+    return near
 
 
 def clear_of_obstacles(departures: Sequence[Departure], obstacles: Box) -> list[Departure]:

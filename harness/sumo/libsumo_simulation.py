@@ -5,9 +5,10 @@ that SUMO drives is inserted here, and its state is read back. This module conve
 reference point from the body's centre to the front bumper.
 
 Removing a vehicle from SUMO's traffic and adding it again takes as long as ten of its steps. A vehicle that is only
-moved back to its start loses its route in SUMO. If SUMO drives no vehicle, the lost route has no effect. In this case
-players stay in the traffic from game to game, SUMO looks for their lanes along their routes only, and SUMO's driver
-models are disabled for them. SUMO then has the poses of the players, but not always their speeds.
+moved back to its start loses its route in SUMO. If SUMO drives no vehicle of a game, the lost route has no effect. In
+this case players stay in the traffic from game to game, and SUMO's driver models are disabled for them. SUMO then has
+the poses of the players, but not always their speeds. If SUMO drives no vehicle but one that follows the ego, it looks
+for the players' lanes along their routes only.
 """
 
 from __future__ import annotations
@@ -28,13 +29,22 @@ from libsumo import _libsumo  # the same functions without Python wrappers, for 
 from harness.errors import SimulationError
 from harness.game.arrays import FloatArray
 from harness.game.initial_state import InitialState
+from harness.game.roles import EGO
 from harness.road.demand.route_file import Departure
 from harness.road.demand.warm_up import LANE_CHANGE_S
 from harness.road.net.tiles import tile_offset_m, tile_prefix, tiled_net
+from harness.road.scene.following import NO_ROAD
 from harness.road.scene.open_scene import OpenScene
 from harness.road.xml.angles import compass_deg_of, heading_rad_of
 from harness.sumo.background_traffic import BackgroundTraffic
-from harness.sumo.insertion import TYPE_XML, Insertion, StandingVehicles, clear_of_obstacles, clear_of_players
+from harness.sumo.insertion import (
+    TYPES_XML,
+    Insertion,
+    StandingVehicles,
+    clear_of_obstacles,
+    clear_of_players,
+    with_follower,
+)
 from harness.sumo.road_signals import Signals, SpeedLimits
 from harness.sumo.simulation import NO_SIGNALS, AtReset, Reading, Simulation, Tiles
 
@@ -67,8 +77,9 @@ class LibsumoSimulation(Simulation):
             raise SimulationError("this process has a libsumo simulation already")
         self._scene, self._games, self._taken_over = scene, games, tuple(taken_over)
         self._recorded = recorded
-        self._players_only = all(self._taken_over) and not scene.has_background_traffic  # SUMO drives no vehicle
-        self._move_options = _ON_ITS_ROUTE if self._players_only else _ON_ANY_LANE
+        # whether SUMO drives no vehicle, but one that may follow the ego
+        self._alone = all(self._taken_over) and not scene.has_background_traffic
+        self._move_options = _ON_ITS_ROUTE if self._alone else _ON_ANY_LANE
         self._half_length = 0.5 * scene.world.length_m
         self._tiles = Tiles(
             prefixes=[tile_prefix(game, games) for game in range(games)],
@@ -77,11 +88,11 @@ class LibsumoSimulation(Simulation):
         )
         folder = tempfile.TemporaryDirectory(prefix="harness-sumo-")
         types = Path(folder.name) / "types.rou.xml"
-        types.write_text(scene.routes.types_xml.replace("</routes>", f"{TYPE_XML}</routes>"), encoding="utf-8")
+        types.write_text(scene.routes.types_xml.replace("</routes>", f"{TYPES_XML}</routes>"), encoding="utf-8")
         document = scene.document
         # SUMO 1.28 may crash (SIGSEGV) if a placed car leaves a junction's lanes and lane changes take time: they take
-        # time only if SUMO drives a vehicle.
-        duration_s = 0.0 if self._players_only else LANE_CHANGE_S
+        # time only if SUMO drives a vehicle that changes lanes.
+        duration_s = 0.0 if self._alone else LANE_CHANGE_S
         lateral = ["--lanechange.duration", str(duration_s)]
         if self._needs_sublanes():
             lateral = ["--lateral-resolution", str(_LATERAL_RESOLUTION_M)]  # SUMO accepts one of the two options
@@ -125,7 +136,8 @@ class LibsumoSimulation(Simulation):
         world, prefixes = self._scene.world, self._tiles.prefixes
         self._signals = Signals(prefixes, world.right_of_way.signal_links)
         self._speed_limits = SpeedLimits(prefixes) if self._scene.document.varies.speed_limit_share else None
-        blocks = bool(self._scene.obstacles.each) and not self._players_only
+        self._players_only = [self._alone] * self._games  # whether SUMO drives no vehicle of the game
+        blocks = bool(self._scene.obstacles.each) and not (self._alone and self._scene.road_behind is NO_ROAD)
         self._standing = StandingVehicles(self._scene, prefixes, self._traffic) if blocks else None
         fastest_mps = float(world.actuators.max_speed_mps.max())
         self._background = BackgroundTraffic(
@@ -137,12 +149,18 @@ class LibsumoSimulation(Simulation):
 
     def reset(self, game: int, start: InitialState, departures: list[Departure]) -> AtReset:
         with self._calls(f"reset game {game}"):
-            staying = self._present[game] & start.present & self._players_only
+            length_m = self._scene.world.length_m
+            departures = clear_of_players(departures, start, length_m)
+            follower = self._scene.road_behind.follower(start, length_m[EGO])
+            if follower is not None:
+                departures = with_follower(departures, follower, start, length_m)
+            before, players_only = self._players_only[game], self._alone and not departures
+            self._players_only[game] = players_only
+            staying = self._present[game] & start.present & before & players_only
             for player in np.flatnonzero(self._present[game] & ~staying).tolist():
                 self._remove_vehicle(game, player)
             for player in np.flatnonzero(start.present & ~staying).tolist():
                 self._add_player(game, player, start)
-            departures = clear_of_players(departures, start, self._scene.world.length_m)
             if self._standing is not None:
                 self._standing.reset(game, *start.parts)
                 departures = clear_of_obstacles(departures, self._scene.obstacles.boxes(*start.parts))
@@ -160,8 +178,8 @@ class LibsumoSimulation(Simulation):
         self._placed[name] = game * len(self._taken_over) + player
 
     def remove(self, game: int, player: int) -> None:
-        """Remove a player from the traffic. If SUMO drives no vehicle, it stays in place until the next reset."""
-        if not self._players_only:
+        """Remove a player from the traffic. If SUMO drives no vehicle of its game, it stays until the next reset."""
+        if not self._players_only[game]:
             with self._calls(f"remove a player from game {game}"):
                 self._remove_vehicle(game, player)
 
@@ -216,7 +234,7 @@ class LibsumoSimulation(Simulation):
         ahead = self._half_length[player]
         if self._taken_over[player]:
             self._placed[name] = game * len(self._taken_over) + player
-            if self._players_only:
+            if self._players_only[game]:
                 libsumo.vehicle.setActionStepLength(name, _NO_ACTIONS_S)
             else:
                 libsumo.vehicle.setSpeedFactor(name, _ANY_SPEED)

@@ -68,3 +68,28 @@ def test_scene__a_mistake_names_the_person(people: str, message: str, tmp_path: 
 def test_roles__of_more_people_begin_with_those_of_fewer() -> None:
     assert roles_of(2) == ("ego", "non_ego")
     assert roles_of(4) == ("ego", "non_ego", "non_ego_2", "non_ego_3")
+
+
+WALKER = '[[non_ego]]\nkind = "pedestrian"\nway = [[0, 0], [9, 9]]\nroute_m = [0, 1]\nspeed_mps = [1, 2]\n'
+
+
+@pytest.mark.parametrize(("line", "share"), [("", 0.5), ("followed_share = 0.2\n", 0.2), ("followed_share = 0\n", 0.0)])
+def test_scene__the_ego_is_followed_in_half_of_the_games_or_as_written(line: str, share: float, tmp_path: Path) -> None:
+    assert scene_of(line + PERSON, tmp_path).share_followed == share
+
+
+def test_scene__nobody_follows_an_ego_that_does_not_drive_or_meets_a_pedestrian(tmp_path: Path) -> None:
+    assert scene_of(PERSON + WALKER, tmp_path).share_followed == 0.0
+    assert scene_of("followed_share = 0\n" + WALKER, tmp_path).share_followed == 0.0
+    cycling = REST.replace("ego = {", 'ego = { kind = "bicycle",')
+    (tmp_path / "scene.toml").write_text(cycling + PERSON, encoding="utf-8")
+    assert read_document(tmp_path / "scene.toml", Scene).share_followed == 0.0
+
+
+def test_scene__a_follower_with_a_pedestrian_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UsageError) as refused:
+        scene_of("followed_share = 0.5\n" + PERSON + WALKER, tmp_path)
+    (problem,) = refused.value.problems
+    assert (Path(problem.file).name, problem.key) == ("scene.toml", "followed_share")
+    assert "non_ego_2 is a pedestrian" in problem.message
+    assert problem.remedy == "give 0, or leave it out"

@@ -286,7 +286,7 @@ def test_campaign__with_sumos_models(tmp_path: Path) -> None:
     run, manifest, episodes = played(tmp_path, driver, scene="merge")
     check_rounds(run, manifest, episodes, "SUMO's own models of vehicle type idm (idm.toml)")
     trace = pd.read_parquet(run / "traces" / "naive_alone-seed1.parquet")
-    assert set(trace["vehicle_type"]) == {"idm"}
+    assert set(trace.loc[trace["player"] == "ego", "vehicle_type"]) == {"idm"}
 
 
 @pytest.mark.slow

@@ -68,6 +68,7 @@ def build_scene(
     cars: str = CARS,
     goal_m: float = 250.0,
     time_limit_s: float = 20.0,
+    followed_share: float = 0.0,
     net_options: Sequence[str] = (),
 ) -> OpenScene:
     """Write a scene's folder with a net built by netconvert, and open it.
@@ -97,6 +98,7 @@ def build_scene(
 net = "n.net.xml"
 routes = "n.rou.xml"
 time_limit_s = {time_limit_s}
+followed_share = {followed_share}
 goal = {{ edge = "{places["goal"]}", position_m = {goal_m} }}
 ego = {starts["ego"]}
 non_ego = [{", ".join(people)}]

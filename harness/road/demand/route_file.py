@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from harness.game.arrays import FloatArray
+from harness.game.follower import Follower
 from harness.road.demand.stops import Stop
 
 SIZES_M = {
@@ -112,6 +113,8 @@ class Departure:
     """The routes of a distribution. A departure of a game has one route and no choices."""
     motion: Motion | None = None
     """Of a vehicle that drives already when the game begins. `lane` is then the whole id of its lane."""
+    follower: Follower | None = None
+    """The driver of the vehicle that follows the ego."""
     on_foot: bool = False
     """Whether it is a person, whose edges are those of its walk. The speed may be empty: as its type desires."""
 

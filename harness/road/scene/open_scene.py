@@ -23,6 +23,7 @@ from harness.road.demand.route_file import Departure, RouteFile
 from harness.road.demand.warm_up import Snapshot, snapshots
 from harness.road.net import network
 from harness.road.net.levels import heights_of_players_roads
+from harness.road.scene.following import NO_ROAD, RoadBehind, road_behind, with_follower_type
 from harness.road.scene.footway import opened_ground
 from harness.road.scene.open_obstacles import LaneStrip, open_obstacles, strips_near, with_types
 from harness.road.scene.scene_files import read_scene
@@ -52,6 +53,7 @@ class OpenScene:
     junctions: frozenset[str] | None = None  # those that games need; None: all of the net
     obstacles: Obstacles = NO_OBSTACLES
     lane_strips: tuple[LaneStrip, ...] = ()  # lanes that an obstacle may block
+    road_behind: RoadBehind = NO_ROAD  # on which somebody may follow the ego
     stripes: tuple[FloatArray, ...] = ()  # [5, 2] each, of the marked crossings
     roads_m: FloatArray | None = None  # [n, 3] points of the players' roads; None: no other road passes over or under
 
@@ -135,6 +137,7 @@ class OpenScene:
             limit_share=varies.speed_limit_share or (1.0, 1.0),
             signal_place=varies.signal_place or (0.0, 1.0),
             along_route_share=along_route_share,
+            followed_share=self.document.share_followed,
             obstacles=self.obstacles,
         )
 
@@ -158,6 +161,7 @@ def open_scene(folder: str | Path, ego_type: str | None = None) -> OpenScene:
     places = start_places(files, players)
     obstacles = open_obstacles(files, area, [player.route for player in players])
     rail_lines = tuple(network.rail_lines(net, area, own))
+    routes = with_types(files.routes, obstacles)
     background = {name for each in background_departures(files.routes, document.vehicles) for name in each.edges}
     used = [*own, *map(net.getEdge, sorted(background))]  # background traffic needs its whole routes
     scene = OpenScene(
@@ -165,10 +169,11 @@ def open_scene(folder: str | Path, ego_type: str | None = None) -> OpenScene:
         document=document,
         world=world_of(files, players, rail_lines=rail_lines, ground=ground, obstacles=obstacles),
         net_warnings=files.net_warnings,
-        routes=with_types(files.routes, obstacles),
+        routes=with_follower_type(routes) if document.share_followed else routes,
         obstacles=obstacles,
         lane_strips=strips_near(net, used, obstacles),
         places=places,
+        road_behind=road_behind(files) if document.share_followed else NO_ROAD,
         edges=tuple(player.edges for player in players),
         rail_lines=rail_lines,
         junctions=network.junctions_near(net, used),
