@@ -15,7 +15,7 @@ from pathlib import Path
 import libsumo
 import sumo
 
-from harness.sumo.insertion import OBSTACLE_TYPE, TYPE_XML, stand
+from harness.sumo.insertion import OBSTACLE_TYPE, TYPES_XML, stand
 
 _NODES = '<nodes><node id="a" x="0" y="0"/><node id="b" x="300" y="0"/><node id="c" x="600" y="0"/></nodes>'
 _EDGE = '<edge id="{}" from="{}" to="{}" numLanes="{}" speed="13.89" spreadType="right"/>'
@@ -74,7 +74,7 @@ def _net(folder: Path, lanes: int) -> Path:
     edges = _EDGE.format("first", "a", "b", lanes) + _EDGE.format("second", "b", "c", lanes)
     (folder / "n.nod.xml").write_text(_NODES, encoding="utf-8")
     (folder / "n.edg.xml").write_text(f"<edges>{edges}</edges>", encoding="utf-8")
-    (folder / "types.rou.xml").write_text(f"<routes>{TYPE_XML}</routes>", encoding="utf-8")
+    (folder / "types.rou.xml").write_text(f"<routes>{TYPES_XML}</routes>", encoding="utf-8")
     program = Path(sumo.SUMO_HOME) / "bin" / "netconvert"
     files = ("-n", "n.nod.xml", "-e", "n.edg.xml", "-o", "n.net.xml")
     subprocess.run([program, *files], cwd=folder, check=True, capture_output=True)
