@@ -112,7 +112,7 @@ def test_wheel__a_new_project_is_in_order_and_shipped_campaigns_have_names(envir
     lab = tmp_path / "lab"
     assert sorted(each.name for each in lab.iterdir()) == ["README.md", "campaign.toml", "networks", "personas"]
     assert "5 trainings" in run(environment, lab, "harness", "check", "campaign.toml").stdout
-    run(environment, lab, "harness", "check", "merge-demo")
+    run(environment, lab, "harness", "check", "demo")
     run(environment, lab, "harness", "persona", "show", "my_driver")
 
 

@@ -124,8 +124,8 @@ def test_documents__show_what_the_stored_tables_hold(
 
 
 def test_cost__counts_trainings_steps_and_arms_of_the_plan() -> None:
-    merge = REPOSITORY / "campaigns" / "merge.toml"
-    header, _, row, total = cost.cost_table([merge], REPOSITORY).splitlines()
+    campaign = REPOSITORY / "campaigns" / "paper_merge.toml"
+    header, _, row, total = cost.cost_table([campaign], REPOSITORY).splitlines()
     cells = dict(zip(header.split("|"), row.split("|"), strict=True))
     assert [cells[f" {name} "].strip() for name in ("trainings", "steps", "arms")] == ["5", "15.0 M", "10"]
     hours = float(cells[" core-hours "])

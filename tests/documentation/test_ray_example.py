@@ -36,8 +36,8 @@ def test_example__two_machines_on_one_give_the_numbers_of_one(tmp_path: Path) ->
     run = tmp_path / "run"
     changes = {
         "6379": str(free_port()),
-        "campaigns/merge-demo.toml": str(write_campaign(tmp_path, **BY_SUMO)),
-        "reports/merge-demo-ray": str(run),
+        "campaigns/demo.toml": str(write_campaign(tmp_path, **BY_SUMO)),
+        "reports/demo-ray": str(run),
         "ray stop\n": "",
         "--num-cpus=1": "--num-cpus=1 --object-store-memory=80000000 --disable-usage-stats",
     }

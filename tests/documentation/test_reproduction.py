@@ -38,15 +38,20 @@ def game(arm: str, failed: Any, speed: float = 10.0, non_ego: str = "goal", erro
 
 GAMES = [
     *[game("naive_alone", False, 10.0)] * 4,
-    *[game("naive_vs_speedy", failed, 9.0, "collision" if failed else "goal") for failed in (True, True, False, False)],
-    game("naive_vs_speedy", None, float("nan"), "error", "the simulator died"),
-    *[game("retrained_vs_speedy", False, 9.4)] * 4,
+    *[
+        game("naive_vs_paper_speedy", failed, 9.0, "collision" if failed else "goal")
+        for failed in (True, True, False, False)
+    ],
+    game("naive_vs_paper_speedy", None, float("nan"), "error", "the simulator died"),
+    *[game("retrained_vs_paper_speedy", False, 9.4)] * 4,
 ]
 
 
 def found_in_games(what: str) -> tuple[float, bool]:
     """The value of a row of the table in `GAMES`, and whether it is as expected."""
-    rows = pd.DataFrame([{"question": "RQ1", "persona": "speedy", "metric": "failure", "p_value": 0.02, "p_holm": 0.1}])
+    rows = pd.DataFrame(
+        [{"question": "RQ1", "persona": "paper_speedy", "metric": "failure", "p_value": 0.02, "p_holm": 0.1}]
+    )
     tables = findings.Tables(episodes=pd.DataFrame(GAMES), comparisons=rows, lawful_payoff=1.0, limit_mps=12.5)
     finding = next(each for each in findings.findings() if each.what == what)
     value = finding.value(tables)
@@ -57,12 +62,12 @@ def found_in_games(what: str) -> tuple[float, bool]:
     ("what", "value", "holds"),
     [
         ("naive_alone: failures", 0.0, True),
-        ("naive_vs_speedy: failures", 0.5, True),  # the game with an error is not one of the four
-        ("naive_vs_speedy: speed against naive_alone", -0.1, True),
-        ("retrained_vs_speedy: speed against naive_alone", -0.06, False),
-        ("naive_vs_speedy: its payoff less a law-abiding driver's", 2.0, True),
-        ("RQ1 speedy: p of failure", 0.02, False),
-        ("RQ1 speedy: Holm-corrected p of failure", 0.1, False),
+        ("naive_vs_paper_speedy: failures", 0.5, True),  # the game with an error is not one of the four
+        ("naive_vs_paper_speedy: speed against naive_alone", -0.1, True),
+        ("retrained_vs_paper_speedy: speed against naive_alone", -0.06, False),
+        ("naive_vs_paper_speedy: its payoff less a law-abiding driver's", 2.0, True),
+        ("RQ1 paper_speedy: p of failure", 0.02, False),
+        ("RQ1 paper_speedy: Holm-corrected p of failure", 0.1, False),
     ],
 )
 def test_finding__is_computed_from_the_games_without_errors(what: str, value: float, holds: bool) -> None:
@@ -70,7 +75,7 @@ def test_finding__is_computed_from_the_games_without_errors(what: str, value: fl
 
 
 def test_finding__a_goal_rate_counts_a_game_with_an_error_as_not_reached() -> None:
-    assert found_in_games("naive_vs_speedy: its own goal") == (pytest.approx(0.4), False)
+    assert found_in_games("naive_vs_paper_speedy: its own goal") == (pytest.approx(0.4), False)
 
 
 def test_page__shows_the_stored_findings() -> None:

@@ -51,7 +51,7 @@ def notebooks(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("notebooks")
     done = script("notebooks.py", folder)
     assert done.returncode == 0, done.stderr
-    shutil.copytree(REPOSITORY / "reports" / "merge", folder / "reports" / "merge")
+    shutil.copytree(REPOSITORY / "reports" / "paper_merge", folder / "reports" / "paper_merge")
     return folder
 
 
