@@ -82,7 +82,9 @@ def react(
     return updated, reacting, np.where(danger, braking, 0.0)
 
 
-def steering_rad(motion: OwnMotion, *, law: LaneKeeping, wheelbase_m: float, step_s: float) -> FloatArray:
+def steering_rad(
+    motion: OwnMotion, *, law: LaneKeeping, wheelbase_m: float, step_s: float, lag_s: float = 0.0
+) -> FloatArray:
     """Steering angle to request (Stanley's law: Hoffmann et al. 2007, Autonomous Automobile Trajectory Tracking,
     with feedforward of the path's curvature, as the observation gives it):
 
@@ -91,7 +93,8 @@ def steering_rad(motion: OwnMotion, *, law: LaneKeeping, wheelbase_m: float, ste
     where `turned` is the direction of the path relative to that in which the middle of the car moves when it follows
     the path, and `left` is the distance of the path to the left of the front axle. In a bend a car on its path points
     outwards by the steady-state yaw of that paper, atan(tan(steering) / 2): without this term it would cut the bend.
-    The angle and its rate are limited so that lateral acceleration and lateral jerk stay within UN R79.
+    The angle and its rate are limited so that lateral acceleration and lateral jerk stay within UN R79. What is
+    requested leads to this angle within a step: the lag of the steering is known.
     """
     steady_yaw = np.arctan(0.5 * np.tan(motion.road_steering_rad))
     turned, speed = motion.path_turned_rad[:, 0] - steady_yaw, motion.speed_mps
@@ -105,7 +108,8 @@ def steering_rad(motion: OwnMotion, *, law: LaneKeeping, wheelbase_m: float, ste
     largest = np.arctan(wheelbase_m * law.max_lateral_mps2 / speed2)
     rate = wheelbase_m * law.max_lateral_jerk_mps3 * step_s / speed2
     wanted = np.clip(wanted, -largest, largest)
-    return np.clip(wanted, motion.steering_rad - rate, motion.steering_rad + rate)
+    followed_share = 1.0 - np.exp(-step_s / lag_s) if lag_s else 1.0
+    return motion.steering_rad + np.clip(wanted - motion.steering_rad, -rate, rate) / followed_share
 
 
 class RulesDriver:
@@ -135,7 +139,8 @@ class RulesDriver:
         requested = self._react(games, motion, encounters, cruising)
         state[_CRUISING, games], state[_REQUESTED, games] = cruising, requested
         wheelbase = float(car.actuators.wheelbase_m[0])
-        steering = steering_rad(motion, law=rules.lane_keeping, wheelbase_m=wheelbase, step_s=car.step_s)
+        lag_s = car.limits["steering_lag_s"]
+        steering = steering_rad(motion, law=rules.lane_keeping, wheelbase_m=wheelbase, step_s=car.step_s, lag_s=lag_s)
         return car.actions(requested, steering, observation)
 
     def sees_danger(self, observation: FloatArray) -> BoolArray:

@@ -228,7 +228,9 @@ def test_steering__brings_the_car_onto_its_path_within_limits(car: Car, speed_mp
         view = seeing(speed_mps, turned=-float(state.heading_rad[0, 0]), path_left_m=-float(state.y_m[0, 0]))
         view[0, LAYOUT.index("steering_rad")] = state.steering_rad[0, 0] / actuators.max_steering_rad[0]
         seen, _ = perceive(car, view)
-        action = car.actions(np.zeros(1), steering_rad(seen, law=law, wheelbase_m=2.7, step_s=car.step_s), view)
+        lag_s = car.limits["steering_lag_s"]
+        requested = steering_rad(seen, law=law, wheelbase_m=2.7, step_s=car.step_s, lag_s=lag_s)
+        action = car.actions(np.zeros(1), requested, view)
         acceleration, steering = requests(action[:, None], state.speed_mps, np.zeros((1, 1)), actuators)
         move(state, Requested(acceleration, steering, np.ones((1, 1), dtype=bool)), actuators, car.step_s)
         offsets.append(float(state.y_m[0, 0]))
