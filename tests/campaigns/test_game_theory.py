@@ -59,7 +59,7 @@ def test_arms_race__everyone_has_met_everyone_and_who_could_still_gain_was_measu
     assert (table["games"] == 4).all()
     table = pd.read_csv(arms_race() / "gaps.csv")
     assert sorted(zip(table["persona"], table["round"], table["role"], strict=True)) == [
-        (who, 4, role) for who in ("texting", "speedy") for role in ("ego", "non_ego")
+        (who, 4, role) for who in ("speedy", "texting") for role in ("ego", "non_ego")
     ]
     assert 'id="game"' in (arms_race() / "report.html").read_text(encoding="utf-8")
     printed = (arms_race().parent / "printed").read_text(encoding="utf-8")

@@ -13,6 +13,7 @@ from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import TraceReader
 from tests.support.scenes import build_scene
 from tests.support.shared import built_once
+from tests.support.shipped import stage
 from tests.support.tiny import UNTRAINED, finished
 
 pytestmark = pytest.mark.slow
@@ -50,12 +51,12 @@ def run() -> Path:
 
 
 def obstacles_of(run: Path, arm: str, episode: int) -> pd.DataFrame:
-    trace = TraceReader().read(run / "traces" / f"{arm}-seed1.parquet", episode)
+    trace = TraceReader().read(run / "traces" / f"{stage(arm)}.parquet", episode)
     return trace[trace["player"].str.startswith("obstacle_")]
 
 
 def test_trace__has_the_obstacles_in_every_step(run: Path) -> None:
-    trace = TraceReader().read(run / "traces" / "naive_alone-seed1.parquet", 0)
+    trace = TraceReader().read(run / "traces" / f"{stage('naive_alone')}.parquet", 0)
     steps = trace["step"].nunique()
     found = obstacles_of(run, "naive_alone", 0)
     assert found.groupby("player").size().to_dict() == {"obstacle_1": steps, "obstacle_2": steps}
