@@ -79,7 +79,7 @@ def test_following_gap__is_the_median_over_the_own_speed_and_such_a_road_is_not_
     length_m = float(merge.world.length_m[0])
     leader = {"x_m": 20.0 + length_m + 1.5 * 6.0, "speed_mps": 6.0}
     row = conduct(merge, car("ego", speed_mps=6.0, steps=170), car("non_ego", **leader, steps=170))
-    assert row["following_gap_s"] == pytest.approx(1.5, abs=0.03)
+    assert row["following_gap_s"] == pytest.approx(1.5, abs=0.04)  # places are known within 0.25 m of the route
     assert row["free_over_limit_mps"] is None
     # 15 s behind a vehicle are not yet following
     row = conduct(merge, car("ego", speed_mps=6.0, steps=150), car("non_ego", **leader, steps=150))
