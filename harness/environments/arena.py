@@ -19,7 +19,7 @@ from harness.environments.seats import Seat as Seat
 from harness.environments.seats import with_walkers
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.bicycle import Requested, move, requests
-from harness.game.human_factors import PlayersLimits, release_controls
+from harness.game.human_factors import PlayersLimits, held_steering_rad, release_controls
 from harness.game.initial_state import InitialState
 from harness.game.memory import Memory
 from harness.game.observation import observe
@@ -206,8 +206,12 @@ class Arena(LiveSimulation):
         if self._limits.spares:
             acceleration, steering = self._limits.within(acceleration, steering)
         lapses = (self._lapsed, self._held, self._lapsed_steering_rad)
-        present = (state.acceleration_mps2, self._road_steering_rad)
-        state.lapsed = release_controls((acceleration, steering), present, lapses, now, drove)
+        held = (state.acceleration_mps2, self._road_steering_rad)
+        if self._held.any():
+            routes = self.world.road.routes
+            road = (self._road_steering_rad, routes.heading_rad[routes.rows(state.station_m)])
+            held = (state.acceleration_mps2, held_steering_rad(state, road, self.world.actuators.wheelbase_m))
+        state.lapsed = release_controls((acceleration, steering), held, lapses, now, drove)
         return acceleration, steering
 
     def _payoffs(self, quantities: Quantities, drove: BoolArray) -> FloatArray:

@@ -34,6 +34,8 @@ from harness.game.state import ALL_AROUND, State
 Controls = Literal["released", "held"]
 
 _QUANTILE_95 = 1.6449  # of the standard normal distribution
+PERIPHERAL_S = 2.0
+"""Time constant with which peripheral sight turns a car to the direction of the road in a glance. Chosen here."""
 PERSISTENCE_S = 20.0  # correlation time of estimation errors (Treiber, Kesting and Helbing 2006, table 1)
 
 
@@ -176,7 +178,7 @@ def draw_lapses(attention: Attention, steps: int, step_s: float, generator: np.r
 @compiled
 def release_controls(
     requested: tuple[FloatArray, FloatArray],
-    present: tuple[FloatArray, FloatArray],
+    held: tuple[FloatArray, FloatArray],
     lapses: tuple[BoolArray, BoolArray, FloatArray],
     step: IntArray,
     drove: BoolArray,
@@ -184,21 +186,29 @@ def release_controls(
     """Release or hold pedals and wheel of the players whose attention lapses in this step.
 
     The requested accelerations and steering angles [G, P] are changed in place. Released: no acceleration, and the
-    angle that bumps give the wheel. Held: the acceleration of the moment, and the angle of the road and the bumps;
-    `present` are the accelerations and the steering angles of the road [G, P]. `lapses` are the steps with a lapse
+    angle that bumps give the wheel. Held: the accelerations and steering angles of `held` [G, P], the latter with the
+    angle of the bumps. `lapses` are the steps with a lapse
     [G, P, T], whether a player holds pedals and wheel [G, P], and the steering angles of the bumps [G, P, T]; step [G]
     the current steps, drove [G, P] the players that still drive. Returns [G, P]: the players with a lapse.
     """
-    (acceleration_mps2, steering_rad), (lapsed, held, bump_rad) = requested, lapses
+    (acceleration_mps2, steering_rad), (lapsed, holds, bump_rad) = requested, lapses
     inattentive = np.zeros(drove.shape, dtype=np.bool_)
     for g, p in np.ndindex(drove.shape):
         if drove[g, p] and lapsed[g, p, step[g]]:
             inattentive[g, p] = True
             acceleration_mps2[g, p], steering_rad[g, p] = 0.0, bump_rad[g, p, step[g]]
-            if held[g, p]:
-                acceleration_mps2[g, p] = present[0][g, p]
-                steering_rad[g, p] += present[1][g, p]
+            if holds[g, p]:
+                acceleration_mps2[g, p] = held[0][g, p]
+                steering_rad[g, p] += held[1][g, p]
     return inattentive
+
+
+def held_steering_rad(state: State, road: tuple[FloatArray, FloatArray], wheelbase_m: FloatArray) -> FloatArray:
+    """[G, P] the steering angles of players who look away and hold the wheel: they follow the road, and turn the car to
+    its direction. `road` are the steering angles that follow it and its headings [G, P]; wheelbases are [P]."""
+    follows_rad, heading_rad = road
+    turned_rad = (heading_rad - state.heading_rad + np.pi) % (2.0 * np.pi) - np.pi
+    return follows_rad + np.arctan(wheelbase_m * turned_rad / (PERIPHERAL_S * np.maximum(state.speed_mps, 1.0)))
 
 
 # --- limits of the body ----------------------------------------------------------------------------------------------
