@@ -24,9 +24,11 @@ from harness.game.human_factors import (
     draw_estimation_errors,
     draw_lapses,
     glances_over_shoulder,
+    held_steering_rad,
 )
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.observation_layout import LAYOUT, in_units
+from harness.game.state import State
 from harness.game.world import World
 from harness.road.scene.open_scene import OpenScene
 from tests.support.moments import Moment, car, seen
@@ -323,3 +325,12 @@ def test_hands__random_decisions_are_correlated_in_time(straight: OpenScene) -> 
     for later, correlation in ((1, np.exp(-0.2)), (5, np.exp(-1.0)), (40, 0.0)):  # steps of 0.1 s; 0.5 s
         pairs = noise[:, :, 20].ravel(), noise[:, :, 20 + later].ravel()
         assert np.corrcoef(*pairs)[0, 1] == pytest.approx(correlation, abs=0.12)  # 4 standard errors of 1 / sqrt(1200)
+
+
+def test_glance__peripheral_sight_turns_the_car_to_the_road_in_two_seconds() -> None:
+    state = State.empty(1, 2)
+    state.heading_rad[:], state.speed_mps[:] = [[0.1, -0.1]], 10.0
+    road = (np.array([[0.0, 0.02]]), np.zeros((1, 2)))
+    found = held_steering_rad(state, road, np.array([2.7, 2.7]))
+    # 0.1 rad in 2 s at 10 m/s: a curvature of 0.005 /m, and a wheel of atan(2.7 * 0.005) = 0.0134992
+    assert found[0] == pytest.approx([-0.0134992, 0.02 + 0.0134992], abs=1e-6)
