@@ -20,11 +20,11 @@ def lines(driver: str = "mine.toml", **found: Any) -> list[str]:
 
 
 def test_pace__of_an_arm_and_of_a_campaign_with_one_person() -> None:
-    """100 games of 3 s; the ego alone, with SUMO's driver and with the person; 30 % of 3 M steps beside it."""
+    """100 games of 3 s; the ego alone, with SUMO's driver and with the person; half of 3 M steps beside it."""
     assert lines() == [
         "  pace   5 min 00 s for an arm of 100 games in one process",
-        "         a campaign with one person: 3 arms 7 min 30 s in as many processes as cores (2); its 900 k decisions "
-        "in the person's training up to 2 h 30 min",
+        "         a campaign with one person: 3 arms 7 min 30 s in as many processes as cores (2); its 1.5 M decisions "
+        "in the person's training up to 4 h 10 min",
     ]
 
 

@@ -77,7 +77,7 @@ def test_template__describes_keys_with_units_and_bounds() -> None:
     text = " ".join(re.sub(r"^#? ?", "", line) for line in persona_template("anna").splitlines())
     for words in (
         f"{AttentionLapses.model_fields['mean_attentive_s'].description} Unit: s. Above 0.1, at most 3600.",
-        f"{Perception.model_fields['no_shoulder_glance_share'].description} 0 to 1.",
+        " ".join(f"{Perception.model_fields['no_shoulder_glance_share'].description} 0 to 1.".split()),
         'One of "mode", "sampled". Default: "mode".',
         "Letters, digits and _, a letter first; 1 to 40 characters.",
         *FUZZY_QUANTITIES.values(),

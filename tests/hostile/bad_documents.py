@@ -168,7 +168,6 @@ PERSONAS = [
                 ("[reaction]", "delay_s = [0.5, 6.0]", ("reaction.delay_s[1]", "6.0 is not possible")),
                 ("[reaction]", "delay_s = [nan, nan]", ("reaction.delay_s",)),
                 ("[reaction]", "delay_s = 0.5", ("reaction.delay_s",)),
-                ("[reaction]", "", ("reaction.delay_s: is missing",)),
                 ("[actuators]", "throttle_share = 0.0", ("actuators.throttle_share",)),
                 ("[actuators]", "braking_share = 1.5", ("actuators.braking_share",)),
                 ("[actuators]", "stering_share = 0.5", ("actuators.stering_share", "'steering_share'")),
