@@ -2,8 +2,7 @@
 
 It walks along its way at a comfortable speed. At a kerb it waits until each vehicle arrives later than it has passed
 the vehicle's lane, by the start-up and clearance time of the Highway Capacity Manual. On a marked crossing it also goes
-before a vehicle that can still stop in comfort. It steps back over the kerb, and farther on the carriageway it does not
-turn back.
+before a vehicle that can still stop in comfort. On the carriageway it does not turn back.
 """
 
 from __future__ import annotations
@@ -16,6 +15,7 @@ from harness.config.road_user import WALKING_MPS
 from harness.drivers.car import car_of
 from harness.drivers.perception import Encounters, OwnMotion, perceive
 from harness.game.arrays import BoolArray, FloatArray, IntArray
+from harness.game.junctions import KERB_M
 from harness.game.observation_layout import LAYOUT
 from harness.game.walking import TURNS_AS_AT_MPS
 from harness.game.world import World
@@ -23,8 +23,6 @@ from harness.game.world import World
 MARGIN_S = 3.0
 """Start-up and end clearance in the critical headway of pedestrians (Highway Capacity Manual 2010)."""
 _REFUGE_M = 1.5  # room between two lanes in which people wait
-_ON_KERB_M = 0.1
-_OVER_KERB_M = 0.4  # so far over the kerb it still stops for a vehicle that it sees late, from behind a parked one
 _DRIVERS_REACT_S, _DRIVERS_BRAKE_MPS2 = 1.0, 3.0  # of a vehicle that can stop in comfort
 _STOPPING_MPS2, _CHANGE_MPS2 = 1.0, 1.4
 _LOOKS_AHEAD_M = 1.5  # it turns to a point of its way this far ahead
@@ -53,15 +51,13 @@ class OrdinaryWalker:
         motion, others = perceive(self._car, observation)
         front_m = self._goal_m - self._car.physical(observation)[:, _GOAL] + 0.5 * self._car.length_m
         ahead_m = self._kerbs_m - front_m[:, None]
-        room_m = np.where(ahead_m >= -_OVER_KERB_M, np.maximum(ahead_m, 0.0), np.inf).min(axis=1, initial=np.inf)
+        room_m = np.where(ahead_m >= -KERB_M, np.maximum(ahead_m, 0.0), np.inf).min(axis=1, initial=np.inf)
         waits = self._must_wait(others) & np.isfinite(room_m)
         target_mps = np.where(waits, np.sqrt(2.0 * _STOPPING_MPS2 * np.where(waits, room_m, 0.0)), WALKING_MPS)
         target_mps = np.minimum(target_mps, WALKING_MPS)
         change_mps2 = np.clip((target_mps - motion.speed_mps) / self._car.step_s, -_CHANGE_MPS2, _CHANGE_MPS2)
         stands = (motion.speed_mps <= 0.0) & (target_mps < 0.1)
         change_mps2 = np.where(stands, 0.0, change_mps2)
-        over_kerb = ((ahead_m < -_ON_KERB_M) & (ahead_m >= -_OVER_KERB_M)).any(axis=1)
-        change_mps2 = np.where(waits & over_kerb, -_CHANGE_MPS2, change_mps2)  # at a stand this leads backwards
         return self._car.actions(change_mps2, self._steering_rad(motion), observation)
 
     def _must_wait(self, others: Encounters) -> BoolArray:

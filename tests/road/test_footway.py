@@ -20,7 +20,7 @@ from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.repository import REPOSITORY
 
 NETWORKS = REPOSITORY / "networks"
-WAY = "way = [[127.5, -7.6], [147.5, -7.6], [147.5, 6.0]]"
+WAY = "way = [[130.0, -7.6], [150.0, -7.6], [150.0, 6.0]]"
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,7 @@ def test_way__is_the_walkers_route_up_to_its_end(crossing: OpenScene) -> None:
     assert world.walks.tolist() == [False, True]
     assert routes.goal_m[1] == pytest.approx(20.0 + 13.6)
     row = routes.rows(np.array([[0.0, 10.0]]))[0, 1]
-    assert (routes.x_m[row], routes.y_m[row]) == pytest.approx((137.5, -7.6))
+    assert (routes.x_m[row], routes.y_m[row]) == pytest.approx((140.0, -7.6))
     assert routes.speed_limit_mps[row] == WALKING_MPS
     # on the pavement: 7.6 + 8.5 m to the left edge of the other one, 0.9 m to the right edge
     assert (routes.left_edge_m[row], routes.right_edge_m[row]) == pytest.approx((16.1, -0.9), abs=0.05)
@@ -66,8 +66,8 @@ def test_carriageway__is_the_road_between_the_pavements(crossing: OpenScene) -> 
 def test_conflicts__are_where_the_way_crosses_the_lanes(crossing: OpenScene) -> None:
     table = crossing.world.right_of_way.conflicts
     assert table.player.tolist() == [0, 1, 1]
-    # the ego, 1.1 m of room on either side of its line at y = -1.75, and the walker, 0.5 m, at x = 147.5
-    assert (table.begin_m[0], table.end_m[0]) == pytest.approx((147.0, 148.0))
+    # the ego, 1.1 m of room on either side of its line at y = -1.75, and the walker, 0.5 m, at x = 150
+    assert (table.begin_m[0], table.end_m[0]) == pytest.approx((149.5, 150.5))
     assert (table.zone_m[0], table.length_m[0]) == pytest.approx((20.0 + 7.6 - 2.85, 2.2))
     # the walker, lane by lane: y from -2.85 to -0.65, and from 0.65 to 2.85
     assert table.begin_m[1:] == pytest.approx([24.75, 28.25])
