@@ -167,7 +167,7 @@ def test_keys__what_a_persona_declares_of_people_changes_no_game(tmp_path: Path,
         ({"ego": {"persona": str(SPEEDY)}}, {"naive", *ARMS_OF_NO_PERSONA, *of_persona("speedy")}),
         ({"assessment": {"episodes": 5}}, ARMS_OF_NO_PERSONA | {arm.format("speedy") for arm in LEARNED_ARMS}),
         ({"assessment": {"episodes": 4, "significance": 0.2}}, set()),
-        ({"non_ego_training": {"alone_share": 0.5}}, of_persona("speedy")),
+        ({"non_ego_training": {"alone_share": 0.7}}, of_persona("speedy")),
         (
             {"retraining": {"alone_share": 0.5}},
             {"retrained_speedy", "retrained_vs_speedy", "retrained_alone_speedy"},

@@ -135,7 +135,7 @@ OF_NAIVE = """
 OF_NON_EGO = """
     | player | non_ego |
     | against | `naive-seed1` |
-    | games without the other player | 70 % |
+    | games without the other player | 50 % |
     lapses of 4 to 6 s, with 4 s of attention between them on average
     | no lapses in | the first 50 % of the budget |
     5 seconds
@@ -152,7 +152,7 @@ OF_RETRAINED = """
 OF_SPEEDY = """
     fuzzy, of `speed_over_limit`: within (0: 1, 0.15: 0) has the value 0; over
     - Actions are sampled from the policy's distribution
-    - No blind-spot check in 85 % of the drives
+    - No glance over the shoulder in 85 % of the drives
 """
 
 
