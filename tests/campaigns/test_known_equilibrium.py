@@ -68,13 +68,14 @@ CARS = "".join(
 )
 CAR = (
     f"{{ max_acceleration_mps2 = {PEDALS_MPS2}, max_braking_mps2 = {PEDALS_MPS2}, max_steering_rad = 1e-20, "
-    "wheelbase_m = 1.8 }"
+    "wheelbase_m = 1.8, throttle_lag_s = 0.0, brake_lag_s = 0.0, max_jerk_mps3 = 100.0 }"
 )
 SCENE = f"""name = "side_by_side"
 net = "n.net.xml"
 routes = "n.rou.xml"
 step_length_s = {STEP_S}
 time_limit_s = {STEPS * STEP_S}
+followed_share = 0.0
 goal = {{ edge = "road", position_m = 250.0 }}
 [ego]
 vehicle = "ego"
@@ -96,8 +97,13 @@ statistic = "Nobody has counted them."
 citation = "nobody, nowhere"
 [safety.terms]
 vehicle_clearance = {{ weight = {weight}, within_m = 10.0 }}
+[reaction]
+delay_s = [0.0, 0.0]
+[perception]
+distance_error = 0.0
+closing_error_per_s = 0.0
 """
-BLIND = "[perception]\nrange_m = 0.1\n"
+BLIND = "range_m = 0.1\n"
 TRAINING: dict[str, Any] = {
     "steps": 16_384,
     "segment_steps": 16_384,

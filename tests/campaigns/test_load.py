@@ -100,7 +100,7 @@ def soak() -> Iterator[Weight]:
     scene, persona = open_scene(PAPER_MERGE), read_document(SPEEDY, Persona)
     arena = Arena(scene, GAMES, [Seat(None, persona.payoff), Seat(None, persona.payoff)])
     chance = np.random.default_rng(1)
-    actions = np.clip(chance.normal([0.1, 0.0], [0.4, 0.1], (509, GAMES, 2, 2)), -1.0, 1.0)
+    actions = np.clip(chance.normal([0.1, 0.0], [0.4, 0.3], (509, GAMES, 2, 2)), -1.0, 1.0)
     played, outcomes = 0, set[int]()
     steps = GAME_STEPS // GAMES
     for step in range(steps + 1):
