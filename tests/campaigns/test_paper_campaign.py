@@ -94,7 +94,7 @@ def test_campaign__manifest_and_training_table_say_what_was_done(run: Path) -> N
     assert "segments" in naive["rule"]
     assert {"harness", "libsumo", "torch", "numpy"} <= set(manifest["versions"])
     assert manifest["campaign"]["training"]["steps"] == 2048
-    assert {"learned.toml", "speedy.toml", "merge.net.xml"} <= {Path(name).name for name in manifest["hashes"]}
+    assert {"learned.toml", "speedy.toml", "paper_merge.net.xml"} <= {Path(name).name for name in manifest["hashes"]}
     curves = read_csv(run / "training.csv").groupby(["stage", "persona"])["steps"].agg(list).to_dict()
     trainings = [("naive", ""), ("speedy", "speedy"), ("retrained_speedy", "speedy")]
     assert curves == {each: [1024, 2048] for each in trainings}
