@@ -117,6 +117,13 @@ class StartDistribution:
     obstacles: Obstacles = NO_OBSTACLES
 
 
+def of_people(human_factors: Sequence[Sequence[HumanFactors]]) -> list[list[HumanFactors]]:
+    """The human factors of the players' drivers [P][n]; the ego is a machine and has none."""
+    of_all = [list(each) for each in human_factors]
+    of_all[EGO] = [HumanFactors()] * len(of_all[EGO])
+    return of_all
+
+
 def draw_initial_state(starts: StartDistribution, *parts: str | int) -> InitialState:
     """Draw the initial state of one game, with seeds hashed from the named parts."""
     generator = generator_of(*parts, "start")

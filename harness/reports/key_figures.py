@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from harness.evaluation.strategies import Arm, EgoStrategy, PersonaNonEgo
+from harness.game.human_factors import Attention
 from harness.game.roles import NON_EGO
 from harness.reports.differences import NO_RELEVANT_DIFFERENCE, faster_by, is_equivalent
 from harness.reports.numbers import NO_SPACE, number, percent, sure
@@ -120,10 +121,10 @@ def portrait(document: Mapping[str, Any]) -> str:
     share = (document.get("perception") or {}).get("no_shoulder_glance_share")
     if share:
         sentences.append(f"It does not glance over the shoulder in {percent(share)} of drives.")
-    if attention := document.get("attention"):
-        low, high = attention["lapse_s"]
-        every = attention["mean_attentive_s"] + (low + high) / 2
-        sentences.append(f"Its eyes leave the road for {low:g} to {high:g} s at a time, about every {every:g} s.")
+    if given := document.get("attention"):
+        attention = Attention(**given)
+        (low, high), every = attention.lapse_s, attention.mean_attentive_s + attention.mean_lapse_s
+        sentences.append(f"Its eyes leave the road for {low:g} to {high:g} s at a time, about every {every:.2g} s.")
     return " ".join(sentence for sentence in sentences if sentence)
 
 

@@ -63,7 +63,7 @@ def test_campaign__every_file_is_there(run: Path) -> None:
     assert {name for name in names_in(run) if not name.startswith(".")} == {*tables, *folders, *others}
     assert names_in(run / "policies") == names_in(run / "tensorboard") == {f"{name}-seed1" for name in TRAININGS}
     assert names_in(run / "traces") == {f"{name}-seed1.parquet" for name in ARMS}
-    assert names_in(run / "scene") == {"scene.toml", "merge.net.xml", "merge.rou.xml"}
+    assert names_in(run / "scene") == {"scene.toml", "paper_merge.net.xml", "paper_merge.rou.xml"}
     for policy in (run / "policies").iterdir():
         assert names_in(policy) == {"policy.safetensors", "policy.json", "README.md"}
         assert read_policy(policy).card["stage"] == policy.name

@@ -12,9 +12,8 @@ import numpy as np
 from harness.config.scene import Scene
 from harness.game.arrays import FloatArray
 from harness.game.human_factors import HumanFactors
-from harness.game.initial_state import StartDistribution
+from harness.game.initial_state import StartDistribution, of_people
 from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles
-from harness.game.roles import EGO
 from harness.game.seeding import between
 from harness.game.start_range import StartRange
 from harness.game.world import World
@@ -122,12 +121,11 @@ class OpenScene:
         """
         varies = self.document.varies
         factors_of = [[each] if isinstance(each, HumanFactors) else list(each) for each in human_factors]
-        factors_of[EGO] = [HumanFactors()] * len(factors_of[EGO])
         return StartDistribution(
             places=self.places,
             length_m=self.world.length_m,
             max_speed_mps=self.world.actuators.max_speed_mps,
-            human_factors=factors_of,
+            human_factors=of_people(factors_of),
             shares=shares or [[1.0] * len(each) for each in factors_of],
             present_share=present_share,
             steps=self.world.steps,
