@@ -7,6 +7,7 @@ Background traffic and obstacles are known as they are.
 
 from __future__ import annotations
 
+from math import ceil
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -18,20 +19,20 @@ from harness.game.state import Bodies, State
 Perceived: TypeAlias = FloatArray
 """[4, G, P, B] x_m, y_m, heading_rad and speed_mps of the bodies as each player takes them to be."""
 
-STEPS = 64
-"""Steps that are remembered; what is older counts as this old."""
+REMEMBERED_S = 6.4
+"""What is older than this counts as this old."""
 
 
 class Memory:
     """The last motion of the players of G games."""
 
     def __init__(self, games: int, players: int, step_s: float) -> None:
-        self._motion = np.zeros((STEPS, 4, games, players))
+        self._motion = np.zeros((ceil(REMEMBERED_S / step_s) + 1, 4, games, players))
         self._now, self._step_s = 0, step_s
 
     def remember(self, state: State) -> None:
         """Add the motion of the players in this step."""
-        self._now = (self._now + 1) % STEPS
+        self._now = (self._now + 1) % len(self._motion)
         self.begin(state)
 
     def begin(self, state: State) -> None:
@@ -40,7 +41,8 @@ class Memory:
 
     def perceived(self, bodies: Bodies, lags: IntArray) -> Perceived:
         """The bodies as players take them to be whose knowledge of each other is so many steps old, [G, P]."""
-        return _perceived(tuple(bodies), self._motion, np.minimum(lags, STEPS - 1), (self._now, self._step_s))
+        lags = np.minimum(lags, len(self._motion) - 1)
+        return _perceived(tuple(bodies), self._motion, lags, (self._now, self._step_s))
 
 
 def as_they_are(bodies: Bodies, players: int) -> Perceived:
@@ -65,7 +67,7 @@ def _perceived(columns: tuple[Any, ...], motion: FloatArray, lags: IntArray, whe
         lag = lags[g, p]
         for b in range(players):
             if lag > 0 and b != p:
-                x_m, y_m, heading_rad, speed_mps = motion[(now - lag) % STEPS, :, g, b]
+                x_m, y_m, heading_rad, speed_mps = motion[(now - lag) % len(motion), :, g, b]
                 moved_m = speed_mps * lag * step_s
                 perceived[0, g, p, b] = x_m + moved_m * np.cos(heading_rad)
                 perceived[1, g, p, b] = y_m + moved_m * np.sin(heading_rad)
