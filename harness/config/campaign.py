@@ -38,7 +38,7 @@ class Ego(Document):
     """`learned`: trained by the campaign. `sumo`: SUMO's own models. Else the folder of a policy, a driver document, or
     the name of an installed driver, of a shipped one, or of a shipped policy (`paper_merge/naive-seed11`)."""
     persona: DocumentPath = "careful"
-    """The persona of the ego, which gives its payoff and decisions. The ego is a machine: it has none of the human limits."""
+    """The persona of the ego: its payoff and decisions. The ego is a machine and has none of the human limits."""
 
 
 class Population(Document):
