@@ -27,7 +27,7 @@ class Memory:
     """The last motion of the players of G games."""
 
     def __init__(self, games: int, players: int, step_s: float) -> None:
-        self._motion = np.zeros((ceil(REMEMBERED_S / step_s) + 1, 4, games, players))
+        self._motion = np.zeros((ceil(REMEMBERED_S / step_s), 4, games, players))
         self._now, self._step_s = 0, step_s
 
     def remember(self, state: State) -> None:

@@ -45,7 +45,7 @@ def test_perceived__of_steady_motion_is_as_it_is_for_every_lag() -> None:
 def test_memory__reaches_as_far_back_in_short_steps() -> None:
     """What is older than `REMEMBERED_S` counts as this old, however long a step is."""
     for step_s in (0.02, 0.1, 0.2):
-        remembered = round(REMEMBERED_S / step_s)
-        memory, bodies = moving_east([10.0] * 3 + [0.0] * remembered, step_s)
-        speed_mps = memory.perceived(bodies, np.full((1, 2), 10 * remembered))[3]
+        before = round(REMEMBERED_S / step_s) - 1  # the step itself is remembered too
+        memory, bodies = moving_east([10.0] * 3 + [0.0] * before, step_s)
+        speed_mps = memory.perceived(bodies, np.full((1, 2), 10 * before))[3]
         assert speed_mps[0, 0, 1] == 10.0
