@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator,
 
 from harness.config.scene import Name
 from harness.config.toml_reading import NUMBER, TABLE, Document, Mistakes, nearest, one_of, ordered
-from harness.game.human_factors import ActuatorShares, Attention, HumanFactors, Reaction, Sight
+from harness.game.human_factors import ActuatorShares, Attention, Controls, HumanFactors, Reaction, Sight
 from harness.game.payoff import FuzzyFunction, FuzzySet, Payoff, Weighted
 from harness.game.payoff_terms import FUZZY_QUANTITIES, GROUPS, NEARNESS, TERMS
 
@@ -159,7 +159,7 @@ class AttentionLapses(Document):
     """Range of the length of a lapse. In a lapse the policy's actions are omitted."""
     lapse_distribution: Literal["uniform", "lognormal"] = "uniform"
     """`uniform`: within the range. `lognormal`: the range holds the middle 90 % of the lapses."""
-    controls: Literal["released", "held"] = "released"
+    controls: Controls = "released"
     """What happens to pedals and wheel in a lapse. `released`: the car coasts with a straight wheel. `held`: the pedals
     stay as they are, and the wheel follows the road, as in a glance at a telephone."""
     bump_steering_sd_rad: float = Field(0.0, ge=0.0, le=0.1)

@@ -27,6 +27,7 @@ from harness.drivers.adaptive_cruise import cruise_mps2
 from harness.drivers.car import Car
 from harness.drivers.perception import Encounters, OwnMotion, perceive
 from harness.game.arrays import BoolArray, FloatArray, IntArray
+from harness.game.bicycle import followed_share
 
 CALM_S = 1.0
 """After this time without danger, the next danger needs the full reaction time again."""
@@ -108,8 +109,8 @@ def steering_rad(
     largest = np.arctan(wheelbase_m * law.max_lateral_mps2 / speed2)
     rate = wheelbase_m * law.max_lateral_jerk_mps3 * step_s / speed2
     wanted = np.clip(wanted, -largest, largest)
-    followed_share = 1.0 - np.exp(-step_s / lag_s) if lag_s else 1.0
-    return motion.steering_rad + np.clip(wanted - motion.steering_rad, -rate, rate) / followed_share
+    turn = np.clip(wanted - motion.steering_rad, -rate, rate)
+    return motion.steering_rad + turn / followed_share(step_s, lag_s)
 
 
 class RulesDriver:

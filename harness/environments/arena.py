@@ -49,8 +49,8 @@ class LiveSimulation:
 
 
 # comparing arrays with members of an enumeration is slower
-_RUNNING, _GOAL, _RAIL = int(Outcome.RUNNING), int(Outcome.GOAL), int(Outcome.RAIL)
-_COLLISION = int(Outcome.COLLISION)
+_RUNNING, _GOAL = int(Outcome.RUNNING), int(Outcome.GOAL)
+_COLLISION, _RAIL = int(Outcome.COLLISION), int(Outcome.RAIL)
 
 
 @dataclass(kw_only=True)
@@ -260,10 +260,10 @@ class Arena(LiveSimulation):
         self._remember_and_observe(replace(quantities, state=state, bodies=bodies))
 
     def _remember_and_observe(self, quantities: Quantities) -> None:
-        """Observe, and keep what the next decisions need: the steering that follows the road."""
-        self._memory.remember(self.state)
+        """Observe what the players know, and keep the steering that follows the road for the next decisions."""
         self._road_steering_rad, perceived = quantities.along.road_steering_rad, None
         if self._limits.delays:
+            self._memory.remember(self.state)
             perceived = self._memory.perceived(quantities.bodies, self._limits.lags(self.state.step))
         self.observation = observe(quantities, perceived)
 

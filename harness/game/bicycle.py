@@ -122,7 +122,7 @@ def _move(cars: tuple[Any, ...], requests: tuple[Any, ...], limits: tuple[Any, .
         if requested.moving[g, p]:
             grip = friction[g] * GRAVITY_MPS2
             rack = actuators.max_steering_rate_radps[p] * step_s
-            followed = _followed_share(step_s, actuators.steering_lag_s[p])
+            followed = followed_share(step_s, actuators.steering_lag_s[p])
             turn = _clamped(followed * (requested.steering_rad[g, p] - steering_rad[g, p]), rack)
             steering = _clamped(steering_rad[g, p] + turn, actuators.max_steering_rad[p])
             requested_curvature = curvature_per_m(steering, actuators.wheelbase_m[p])
@@ -133,7 +133,7 @@ def _move(cars: tuple[Any, ...], requests: tuple[Any, ...], limits: tuple[Any, .
             most_down = min(actuators.max_braking_mps2[p], pedal_grip)
             asked = requested.acceleration_mps2[g, p]
             lag_s = actuators.brake_lag_s[p] if asked < 0.0 else actuators.throttle_lag_s[p]
-            change = _followed_share(step_s, lag_s) * (asked - acceleration_mps2[g, p])
+            change = followed_share(step_s, lag_s) * (asked - acceleration_mps2[g, p])
             change = _clamped(change, actuators.max_jerk_mps3[p] * step_s)
             acceleration = min(max(acceleration_mps2[g, p] + change, -most_down), most_up)
             speed = min(max(before + acceleration * step_s, 0.0), actuators.max_speed_mps[p])
@@ -151,7 +151,7 @@ def _move(cars: tuple[Any, ...], requests: tuple[Any, ...], limits: tuple[Any, .
 
 
 @compiled
-def _followed_share(step_s: float, lag_s: float) -> float:
+def followed_share(step_s: float, lag_s: float) -> float:
     """The share of a request that a first-order lag follows within a step."""
     return 1.0 - np.exp(-step_s / lag_s) if lag_s > 0.0 else 1.0
 

@@ -187,9 +187,9 @@ def release_controls(
 
     The requested accelerations and steering angles [G, P] are changed in place. Released: no acceleration, and the
     angle that bumps give the wheel. Held: the accelerations and steering angles of `held` [G, P], the latter with the
-    angle of the bumps. `lapses` are the steps with a lapse
-    [G, P, T], whether a player holds pedals and wheel [G, P], and the steering angles of the bumps [G, P, T]; step [G]
-    the current steps, drove [G, P] the players that still drive. Returns [G, P]: the players with a lapse.
+    angle of the bumps. `lapses` are the steps with a lapse [G, P, T], whether a player holds pedals and wheel [G, P],
+    and the steering angles of the bumps [G, P, T]; step [G] the current steps, drove [G, P] the players that still
+    drive. Returns [G, P]: the players with a lapse.
     """
     (acceleration_mps2, steering_rad), (lapsed, holds, bump_rad) = requested, lapses
     inattentive = np.zeros(drove.shape, dtype=np.bool_)
@@ -273,8 +273,7 @@ class PlayersLimits:
 
     def reset(self, game: int, player: int, limits: Limits, lapses: Lapses, state: State) -> None:
         """Set a player's limits for a game that starts, and its sight in the state."""
-        if limits.delay_steps or self.delays:
-            self._lags[game, player] = lapses.lags(limits.delay_steps) if limits.delay_steps else 0
+        self._lags[game, player] = lapses.lags(limits.delay_steps) if limits.delay_steps else 0
         self._actuator_shares[game, player] = limits.actuator_shares
         errors = limits.estimation_errors
         self._estimation_errors[game, player] = 0.0 if errors is None else errors
