@@ -40,14 +40,13 @@ class Training(Document):
     network: list[Annotated[int, Field(ge=1, le=1024)]] = Field([64, 64], min_length=1, max_length=6)
     """Sizes of the hidden layers of the actor, and of the critic."""
     demonstration_steps: int = Field(38_400, ge=0, le=10_000_000)
-    """Steps, over all games, in which a rule-based driver (adaptive cruise control and lane keeping) shows a new policy
-    how to drive; at most a fifth of `steps`. The policy imitates it before its training, and the critic learns the
-    payoffs of these games. A person is shown its route alone: what it does about other players it learns from its
-    payoff. On foot there is no demonstration. 0: the policy begins with random parameters."""
+    """Steps, over all games, in which a rule-based driver (adaptive cruise control and lane keeping; on foot an
+    ordinary walker) shows a new policy the way; at most a fifth of `steps`. The policy imitates it before its
+    training, and the critic learns the payoffs of these games. A person is shown its route alone: what it does about
+    other players it learns from its payoff. 0: the policy begins with random parameters."""
     initial_deviation: float = Field(0.25, gt=0.0, le=2.0)
     """Standard deviation of the actions of a new policy. With a wide deviation nearly all games end at the rail at
-    first, and the player learns to stand still, or to crash early, before it learns to drive. People on foot, who
-    learn to walk sooner with more, begin with `max_deviation`."""
+    first, and the player learns to stand still, or to crash early, before it learns to drive."""
     max_deviation: float = Field(0.5, gt=0.0, le=2.0)
     """Upper bound of that standard deviation. Without it, the entropy term raises the standard deviation without limit
     once little is left to learn."""

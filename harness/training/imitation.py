@@ -2,9 +2,9 @@
 
 An untrained driver ends nearly all games at the rail. Where the road bends, the first thing that it learns from its
 payoff is to stand still, because that costs less, and it may never learn to drive. So a new policy first imitates an
-adaptive cruise control with lane keeping. Noise is added to what the demonstrator does, so that its corrections are
-seen as well (Laskey et al. 2017, DART). The critic learns the discounted payoffs of the same games. Everything after
-that is learned from the payoff alone.
+adaptive cruise control with lane keeping; on foot it imitates an ordinary walker. Noise is added to what the
+demonstrator does, so that its corrections are seen as well (Laskey et al. 2017, DART). The critic learns the discounted
+payoffs of the same games. Everything after that is learned from the payoff alone.
 """
 
 from __future__ import annotations
@@ -14,9 +14,11 @@ import torch
 from stable_baselines3 import PPO
 
 from harness.drivers.car import car_of
+from harness.drivers.ordinary_walker import OrdinaryWalker
 from harness.drivers.rules_driver import LANE_KEEPER, RulesDriver
 from harness.environments.vector_env import ArenaVecEnv, JoinedVecEnv
 from harness.game.arrays import BoolArray, FloatArray
+from harness.game.world import World
 
 _EPOCHS, _MINIBATCH, _LEARNING_RATE = 30, 512, 1e-3
 
@@ -25,15 +27,13 @@ def imitate(model: PPO, environment: JoinedVecEnv, *, steps: int, deviation: flo
     """Fit a new model's actor to the demonstrator's actions, and its critic to the payoffs, in `steps` steps over all
     games. The noise added to an action has the standard deviation `deviation`, which is that of the new policy.
 
-    A learner on foot keeps to no lane and has no demonstrator: its model is left as it is.
     Raises SimulationError if SUMO fails, FloatingPointError if a number of a game is impossible.
     """
-    driven = [place for place in environment.environments if not place.arena.world.walks[place.learner]]
     rounds = steps // environment.num_envs
-    if not driven or not rounds:
+    if not rounds:
         return
-    noise = np.random.default_rng(seed)
-    shown = [_demonstrate(place, rounds, discount=model.gamma, deviation=deviation, noise=noise) for place in driven]
+    noise, places = np.random.default_rng(seed), environment.environments
+    shown = [_demonstrate(place, rounds, discount=model.gamma, deviation=deviation, noise=noise) for place in places]
     observations, actions, returns = (np.concatenate(each) for each in zip(*shown, strict=True))
     _fit(model, observations, actions, returns, order=torch.Generator().manual_seed(seed))
 
@@ -43,7 +43,7 @@ def _demonstrate(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """What the demonstrator saw [N, SIZE] and did [N, 2], without the noise, in so many steps of every game, and its
     returns [N]; NaN in games that had not ended."""
-    driver = RulesDriver(LANE_KEEPER, car_of(environment.arena.world, environment.learner))
+    driver = _demonstrator(environment.arena.world, environment.learner)
     games = np.arange(environment.num_envs)
     driver.reset(games)
     observation = environment.reset()
@@ -60,6 +60,10 @@ def _demonstrate(
     environment.take_finished()  # they are not games of the training
     returns = returns_of(np.array(payoffs), np.array(ended), discount)
     return np.concatenate(observations), np.concatenate(actions), returns.ravel()
+
+
+def _demonstrator(world: World, player: int) -> RulesDriver | OrdinaryWalker:
+    return OrdinaryWalker(world, player) if world.walks[player] else RulesDriver(LANE_KEEPER, car_of(world, player))
 
 
 def returns_of(payoffs: FloatArray, ended: BoolArray, discount: float) -> FloatArray:

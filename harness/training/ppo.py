@@ -115,23 +115,17 @@ def _learner(spec: TrainingSpec, environment: JoinedVecEnv, tensorboard: Path | 
         gae_lambda=_GAE_LAMBDA,
         clip_range=settings.clip,
         ent_coef=settings.entropy_coefficient,
-        policy_kwargs={"net_arch": list(settings.network), "log_std_init": float(np.log(_initial_deviation(spec)))},
+        policy_kwargs={"net_arch": list(settings.network), "log_std_init": float(np.log(settings.initial_deviation))},
         device="cpu",
     )
     model.set_logger(configure(str(tensorboard), ["tensorboard"]) if tensorboard else configure(None, []))
     if spec.initial is not None:
-        put_policy(model, spec.initial, _initial_deviation(spec))
+        put_policy(model, spec.initial, settings.initial_deviation)
         return model
     with torch.no_grad():  # a learner that is always alone ignores other road users
         for layers in layers_of(model.policy).values():
             layers[0].weight[:, torch.as_tensor(OF_OTHERS)] = 0.0
     return model
-
-
-def _initial_deviation(spec: TrainingSpec) -> float:
-    """The standard deviation of a new policy's actions. On foot, with more of it a learner learns to walk sooner."""
-    walks = spec.scene.world.walks[spec.places[0].player]
-    return spec.settings.max_deviation if walks else spec.settings.initial_deviation
 
 
 def _imitate(spec: TrainingSpec, model: PPO, environment: JoinedVecEnv) -> None:
@@ -141,7 +135,7 @@ def _imitate(spec: TrainingSpec, model: PPO, environment: JoinedVecEnv) -> None:
         sample(replace(spec, alone_share=1.0), environment, 0, *spec.parts)
     steps, seed = spec.demonstration_steps, seed_of(*spec.parts, "demonstration") % 2**31
     try:
-        imitate(model, environment, steps=steps, deviation=_initial_deviation(spec), seed=seed)
+        imitate(model, environment, steps=steps, deviation=spec.settings.initial_deviation, seed=seed)
     except FloatingPointError as error:
         raise FloatingPointError(f"{error}, in a demonstration") from error
 

@@ -55,10 +55,9 @@ class TrainingSpec:
 
     @property
     def demonstration_steps(self) -> int:
-        """Steps, over all games, that a rule-based driver shows: none of a policy that is given, and none on foot."""
-        drives = any(not self.scene.world.walks[place.player] for place in self.places)
+        """Steps, over all games, that a rule-based driver shows: none of a policy that is given."""
         shown = min(self.settings.demonstration_steps, self.settings.steps // 5)
-        return shown if drives and self.initial is None else 0
+        return shown if self.initial is None else 0
 
 
 def open_games(spec: TrainingSpec) -> JoinedVecEnv:
