@@ -110,7 +110,7 @@ def check(
 
 def _check_campaign(file: Path, allow_code: bool, as_json: bool, console: Console) -> None:
     from harness.campaign.execution.repeat_check import varying_drivers
-    from harness.campaign.plan.persona_remarks import persona_remarks
+    from harness.campaign.plan.persona_remarks import ego_persona_remarks, persona_remarks
     from harness.campaign.preflight import open_campaign
     from harness.config.campaign import LEARNED
     from harness.errors import plain
@@ -123,7 +123,7 @@ def _check_campaign(file: Path, allow_code: bool, as_json: bool, console: Consol
     told = (*varying.items(), *opened.learned_elsewhere.items())
     ego = [plain(each) for each in (*ego, *(f"{driver}: {words}" for driver, words in told))]
     unsuited = persona_remarks(opened.personas, opened.scene.world, opened.document.training.discount)
-    remarks = [*opened.scene.warnings, *unsuited, *ego]
+    remarks = [*opened.scene.warnings, *unsuited, *ego_persona_remarks(opened.ego_persona), *ego]
     print_plain([f"{file} is in order.", *remarks], console)
     print_plain([messages.work(opened, stages), *messages.stage_lines(stages)], console)
     if as_json:

@@ -1,4 +1,5 @@
-"""Personas that a scene gives nothing to decide, or a reason to crash: remarks of `harness check`, no mistakes."""
+"""Remarks of `harness check`, no mistakes: personas that a scene gives nothing to decide, or a reason to crash, and
+human limits that an ego does not have."""
 
 from __future__ import annotations
 
@@ -30,6 +31,15 @@ def persona_remarks(personas: Sequence[Persona], world: World, discount: float) 
             )
         remarks += [f"warning: {persona.name}: {each}" for each in found]
     return remarks
+
+
+def ego_persona_remarks(persona: Persona) -> list[str]:
+    """A sentence on the human limits that the ego's persona names: the ego is a machine and has none."""
+    named = sorted(persona.model_fields_set & {"attention", "perception", "reaction", "actuators"})
+    if not named:
+        return []
+    tables = " and ".join(f"[{name}]" for name in named)
+    return [f"warning: ego.persona: {persona.name} has {tables}, without effect: the ego takes the payoff alone"]
 
 
 def waiting_cost(persona: Persona, world: World, discount: float) -> float:

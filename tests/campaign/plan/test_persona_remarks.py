@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from harness.campaign.plan.persona_remarks import crash_cost, persona_remarks, waiting_cost
+from harness.campaign.plan.persona_remarks import crash_cost, ego_persona_remarks, persona_remarks, waiting_cost
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.road.scene.open_scene import open_scene
@@ -47,3 +47,9 @@ def test_remarks__name_the_payoff_and_the_remedy(scene: str, persona: str, remar
         (found_one,) = found
         assert found_one.startswith(remark)
         assert found_one.split(". ")[1].startswith(("Raise", "Choose"))
+
+
+def test_remarks__an_ego_takes_no_limits_of_its_persona() -> None:
+    assert ego_persona_remarks(shipped("careful")) == []
+    (remark,) = ego_persona_remarks(shipped("drowsy"))
+    assert remark.startswith("warning: ego.persona: drowsy has [attention] and [reaction], without effect")
