@@ -87,10 +87,10 @@ def test_conflicts__at_a_marked_crossing_the_vehicle_yields() -> None:
 
 def test_way__that_crosses_the_road_inside_a_junction_with_signals_is_refused(tmp_path: Path) -> None:
     walks = """kind = "pedestrian"
-way = [[100.0, 95.6], [145.0, 95.6]]                   # along the path beside the road, over the side road
+way = [[204.4, 80.0], [204.4, 150.0]]                  # along the path beside the road, over the other road
 """
     goal = """speed_mps = [4.0, 5.5]
-goal = { edge = "east_out", position_m = 40.0 }"""
+goal = { edge = "north_out", position_m = 40.0 }"""
     folder = changed(
         tmp_path, "cyclist", ("scene.toml", 'kind = "bicycle"\nvehicle = "non_ego"\n', walks),
         ("scene.toml", goal, "speed_mps = [1.0, 1.4]"),
@@ -151,13 +151,15 @@ def test_way__inside_a_junction_is_refused_unless_it_follows_a_crossing(street: 
     assert "crosses the road inside junction 'm'" in problem(street)
 
 
-def test_bicycle__rides_on_its_own_lane_and_the_turning_car_yields() -> None:
-    scene = open_scene(NETWORKS / "cyclist")
+def test_bicycle__rides_on_its_own_lane_and_the_turning_car_yields(tmp_path: Path) -> None:
+    turns = ("cyclist.rou.xml", 'edges="west_in east_out"', 'edges="south_in east_out"')
+    scene = open_scene(changed(tmp_path, "cyclist", turns, ("scene.toml", 'lane = "west_in_0"', 'lane = "south_in_1"'),
+        ("scene.toml", "[110.0, 135.0]", "[40.0, 70.0]")))  # fmt: skip
     routes, table = scene.world.road.routes, scene.world.right_of_way.conflicts
     row = routes.rows(np.array([[0.0, 50.0]]))[0, 1]
-    assert routes.y_m[row] == pytest.approx(95.6)  # the centre of west_in_0
+    assert routes.x_m[row] == pytest.approx(204.4)  # the centre of south_in_0
     lanes = [scene.world.right_of_way.stream_lanes[stream] for stream in table.stream]
-    turn = [row for row in range(len(lanes)) if table.player[row] == 0 and lanes[row] == ("west_in_0", "east_out_0")]
+    turn = [row for row in range(len(lanes)) if table.player[row] == 0 and lanes[row] == ("south_in_0", "north_out_0")]
     assert table.yields[turn].tolist() == [True]
     assert scene.world.actuators.max_lateral_mps2.tolist() == [15.0, 3.6]
 
@@ -187,9 +189,9 @@ def test_walker__faster_than_people_run_is_refused(tmp_path: Path) -> None:
 
 
 def test_bicycle__on_a_route_that_forbids_bicycles_is_refused(tmp_path: Path) -> None:
-    forbid = ("cyclist.net.xml", 'id="east_out_0" index="0" allow="bicycle"', 'id="east_out_0" index="0" allow="bus"')
+    forbid = ("cyclist.net.xml", 'id="north_out_0" index="0" allow="bicycle"', 'id="north_out_0" index="0" allow="bus"')
     text = problem(changed(tmp_path, "cyclist", forbid))
-    assert "vehicle non_ego: its route passes edge 'east_out', which forbids bicycles" in text
+    assert "vehicle non_ego: its route passes edge 'north_out', which forbids bicycles" in text
 
 
 ROAD = shapely.box(0.0, 0.0, 100.0, 7.0)
