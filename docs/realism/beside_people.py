@@ -19,6 +19,7 @@ from harness.evaluation.realism import (
     CRASHES,
     ODDS_SOURCE,
     OF_DRIVERS,
+    OF_RIDERS,
     OF_WALKERS,
     Games,
     HumanFigure,
@@ -48,7 +49,7 @@ def ranges() -> None:
     """The figures of people, with their sources."""
     _print_row("figure", "of", "in games", "people", "source")
     _print_row(*["---"] * 5)
-    for of, figures in (("drivers", OF_DRIVERS), ("people on foot", OF_WALKERS)):
+    for of, figures in (("drivers", OF_DRIVERS), ("people on foot", OF_WALKERS), ("cyclists and riders", OF_RIDERS)):
         for each in figures:
             _print_row(title_of(each.name), of, each.games.value, _range(each), each.source or "none found")
     _print_row(title_of(CRASHES), "all", Games.ALONE.value, "outside if the interval is above 2.91", CRASH_SOURCE)

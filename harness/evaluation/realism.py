@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
@@ -115,6 +115,7 @@ OF_DRIVERS = (
     HumanFigure(metric="longest_lapse_s", games=Games.ALONE, source=""),
 )
 _ROUNDING = 1e-6  # of a figure that a limit of the body holds exactly
+OF_RIDERS = (HumanFigure(metric="accepted_gap_s", source=""),)
 OF_WALKERS = (HumanFigure(metric="accepted_gap_s", low=3.0, source="3 s at least (DiPietro and King 1970)"),)
 CRASHES = "crashes_per_million_km"
 CRASH_SOURCE = "2.91 crashed vehicles per million km (arXiv 2312.12675v3)"
@@ -130,18 +131,21 @@ class _Player(NamedTuple):
 
 
 def realism(
-    conduct: pd.DataFrame, arms: Mapping[str, Arm], declared: Mapping[str, Mapping[str, str]], *, people_drive: bool
+    conduct: pd.DataFrame,
+    arms: Mapping[str, Arm],
+    declared: Mapping[str, Mapping[str, str]],
+    of_people: Sequence[HumanFigure],
 ) -> pd.DataFrame:
     """The table `realism` from the table `conduct`: a row for each player of a run, training seed and figure.
 
     `arms`: by name. `declared`: by persona, the figures in which it is known not to be like people, with the reason of
-    each. `people_drive`: the people of the scene are in cars.
+    each. `of_people`: the figures of the people of the scene; an ego has those of drivers.
     """
     found: list[dict[str, object]] = []
     for player, games in _players(conduct, arms).items():
-        of_people = OF_DRIVERS if people_drive or not player.persona else OF_WALKERS
+        figures = of_people if player.persona else OF_DRIVERS
         alone = games[games["alone"]]
-        rows = [*(_compared(figure, games) for figure in of_people), _crashes(alone)]
+        rows = [*(_compared(figure, games) for figure in figures), _crashes(alone)]
         attentive = persona_alone(player.persona, attentive=True)
         if player.name == player.persona and attentive.name in arms:
             with_open_eyes = (conduct["arm"] == attentive.name) & (conduct["seed"] == player.seed)

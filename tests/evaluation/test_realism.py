@@ -20,6 +20,7 @@ from harness.evaluation.realism import (
     OF_DRIVERS,
     OF_WALKERS,
     OUTSIDE,
+    HumanFigure,
     realism,
 )
 from harness.evaluation.strategies import NAIVE_ALONE, Arm, NaiveEgo, against_persona, persona_alone
@@ -39,9 +40,9 @@ def found(
     *frames: pd.DataFrame,
     arms: dict[str, Arm] = ARMS,
     declared: dict[str, dict[str, str]] = {},  # noqa: B006
-    people_drive: bool = True,
+    of_people: tuple[HumanFigure, ...] = OF_DRIVERS,
 ) -> dict[Any, dict[Any, Any]]:
-    rows = realism(pd.concat(frames, ignore_index=True), arms, declared, people_drive=people_drive)
+    rows = realism(pd.concat(frames, ignore_index=True), arms, declared, of_people)
     return {(row["player"], row["figure"]): row for row in rows.to_dict("records")}
 
 
@@ -141,7 +142,7 @@ def test_seeds__have_rows_of_their_own() -> None:
         games("speedy_alone", "non_ego", lane_change_s=5.0),
         games("speedy_alone", "non_ego", seed=2, lane_change_s=2.0),
     )
-    rows = realism(pd.concat(arms), ARMS, {}, people_drive=True).query("figure == 'lane_change_s'")
+    rows = realism(pd.concat(arms), ARMS, {}, OF_DRIVERS).query("figure == 'lane_change_s'")
     assert list(zip(rows["seed"], rows["realistic"], strict=True)) == [(1, INSIDE), (2, OUTSIDE)]
 
 
@@ -159,7 +160,7 @@ def test_figures__that_a_persona_may_declare_are_those_with_a_published_range() 
 
 
 def test_players__egos_drive_and_people_on_foot_have_figures_of_their_own() -> None:
-    rows = found(games("naive_alone", "ego"), games("speedy_alone", "non_ego"), people_drive=False)
+    rows = found(games("naive_alone", "ego"), games("speedy_alone", "non_ego"), of_people=OF_WALKERS)
     assert [figure for player, figure in rows if player == "naive ego"] == [
         *(each.name for each in OF_DRIVERS),
         CRASHES,

@@ -23,7 +23,7 @@ from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.competence import Goals, goals_alone
 from harness.evaluation.game_theory.findings import GameFindings, find
 from harness.evaluation.people import people_in
-from harness.evaluation.realism import realism
+from harness.evaluation.realism import OF_DRIVERS, OF_RIDERS, OF_WALKERS, HumanFigure, realism
 from harness.evaluation.strategies import Arm, NaiveEgo, ReconfiguredEgo, RetrainedEgo, against_persona
 from harness.evaluation.tables import joined, table_of
 from harness.game.initial_state import member_in_episode
@@ -41,7 +41,7 @@ def evaluated(run: ReadRun) -> RunTables:
     if run.reference_drivers is not None:
         counts = count_prevented(run.reference_drivers, run.episodes)
         prevented = {"reference_drivers": run.reference_drivers, "preventability": counts}
-    found = realism(run.conduct, _arms(run), declared_of(run), people_drive=_people_drive(run))
+    found = realism(run.conduct, _arms(run), declared_of(run), _figures_of_people(run))
     tables = RunTables(
         manifest=manifest,
         arms=_arms(run),
@@ -90,6 +90,12 @@ def _arms(run: ReadRun) -> dict[str, Arm]:
 
 def _people_drive(run: ReadRun) -> bool:
     return all(each.drives for each in run.scene.document.players[1:])
+
+
+def _figures_of_people(run: ReadRun) -> tuple[HumanFigure, ...]:
+    if _people_drive(run):
+        return OF_DRIVERS
+    return OF_WALKERS if all(each.on_foot for each in run.scene.document.players[1:]) else OF_RIDERS
 
 
 def _goals(run: ReadRun) -> dict[str, Goals]:
