@@ -67,8 +67,9 @@ def with_game(reading: Reading | None, games: int, game: int, background: Readin
         row = getattr(background, name)
         column = row[:, :0].repeat(games, axis=0) if reading is None else getattr(reading, name)
         nothing = None if row.dtype == object else 0
-        more = np.full((games, max(most - column.shape[1], 0)), nothing, dtype=row.dtype)
-        columns[name] = np.concatenate((column, more), axis=1)
+        more = max(most - column.shape[1], 0)
+        wider = (column, np.full((games, more), nothing, dtype=row.dtype))
+        columns[name] = np.concatenate(wider, axis=1) if more else column.copy()
         columns[name][game] = nothing
         columns[name][game, :most] = row[0]
     return Reading(**columns) if reading is None else replace(reading, **columns)
