@@ -56,11 +56,11 @@ def no_meetings(shape: tuple[int, ...]) -> Meetings:
 
 
 class _Body(NamedTuple):
-    """A body that a player regards: half its length, its speed, and the number of streams it drives in."""
+    """A body that a player regards: half its length, its speed, and in how many streams it drives."""
 
     half_m: float
     speed_mps: float
-    count: int
+    streams: int
 
 
 class _Player(NamedTuple):
@@ -189,7 +189,7 @@ def _first_conflict(
     zone; -1 without one. `places` are the body's streams, and its place along each stream."""
     (in_streams, along_m), conflicts = places, streams.conflicts
     found, begin_m, other_m = -1, np.inf, np.inf
-    for k in range(body.count):
+    for k in range(body.streams):
         s = in_streams[k]
         for c in range(streams.first_conflict[player.player, s], streams.last_conflict[player.player, s]):
             if player.rear_m > conflicts[c, _END_M] or conflicts[c, _BEGIN_M] >= begin_m:

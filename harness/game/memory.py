@@ -42,7 +42,6 @@ class Memory:
     def perceived(self, bodies: Bodies, lags: IntArray, games: IntArray) -> Perceived:
         """The bodies of games [N] as players take them to be whose knowledge of each other is so many steps old,
         [N, P]."""
-        lags = np.minimum(lags, len(self._motion) - 1)
         return _perceived(tuple(bodies), self._motion, (lags, games), (self._now, self._step_s))
 
 
@@ -69,7 +68,7 @@ def _perceived(
     (lags, games), (now, step_s), players = whose, when, motion.shape[3]
     perceived = _as_they_are(columns, players)
     for g, p in np.ndindex(lags.shape):
-        lag = lags[g, p]
+        lag = min(lags[g, p], len(motion) - 1)
         if lag > 0:
             then = (now - lag) % len(motion)
             for b in range(players):
