@@ -9,7 +9,7 @@ The random numbers of a game are drawn when it is reset (`game.initial_state`). 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NoReturn
 
 import numpy as np
@@ -237,8 +237,9 @@ class Arena(LiveSimulation):
         """Remove players that reached their goal, let those that crashed slide, and observe."""
         outcome = self.state.outcome
         ended = drove & (outcome != _RUNNING)
-        if not ended.any() and not sliding.any():
-            self._remember_and_observe(quantities)
+        changed = np.flatnonzero((ended | sliding).any(1))
+        if not len(changed):
+            self._remember_and_observe(quantities, changed)
             return
         for (game, player), reached in zip(np.argwhere(ended).tolist(), outcome[ended].tolist(), strict=True):
             if reached == _GOAL:
@@ -255,17 +256,34 @@ class Arena(LiveSimulation):
         state.speed_mps[ended & ~slides] = 0.0
         state.acceleration_mps2[ended] = 0.0
         state.lapsed[ended] = False
-        # Positions are unchanged: only speeds are, and which players are present.
-        bodies = self.nearby.of(state, self.reading)
-        self._remember_and_observe(replace(quantities, state=state, bodies=bodies))
+        self._remember_and_observe(quantities, changed)
 
-    def _remember_and_observe(self, quantities: Quantities) -> None:
-        """Observe what the players know, and keep the steering that follows the road for the next decisions."""
-        self._road_steering_rad, perceived = quantities.along.road_steering_rad, None
+    def _remember_and_observe(self, quantities: Quantities, changed: IntArray) -> None:
+        """Observe what the players know, and keep the steering that follows the road for the next decisions.
+
+        `quantities` are those before players were removed, stopped or turned along a rail in the games `changed` [N].
+        """
         if self._limits.delays:
             self._memory.remember(self.state)
-            perceived = self._memory.perceived(quantities.bodies, self._limits.lags(self.state.step))
-        self.observation = observe(quantities, perceived)
+        self._road_steering_rad = quantities.along.road_steering_rad
+        self.observation = self._seen(quantities, self._all_games)
+        if len(changed):
+            # Positions are unchanged: only speeds are, and which players are present.
+            state = self.state.of(changed)
+            columns = ("advanced_m", "lateral_offset_m", "gained_mps2")
+            of_games = {name: getattr(quantities, name)[changed] for name in columns}
+            bodies = self.nearby.of(state, self.reading, changed)
+            after = Quantities(world=self.world, state=state, bodies=bodies, **of_games)
+            self.observation[changed] = self._seen(after, changed)
+            self._road_steering_rad = self._road_steering_rad.copy()
+            self._road_steering_rad[changed] = after.along.road_steering_rad
+
+    def _seen(self, quantities: Quantities, games: IntArray) -> FloatArray:
+        """[N, P, SIZE] the observations of games [N] with these quantities."""
+        if not self._limits.delays:
+            return observe(quantities)
+        lags = self._limits.lags(self.state.step)[games]
+        return observe(quantities, self._memory.perceived(quantities.bodies, lags, games))
 
     # --- observations ------------------------------------------------------------------------------------
 

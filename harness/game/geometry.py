@@ -113,13 +113,15 @@ def _reach(box: Box, cosine: float, sine: float) -> tuple[float, float]:
 
 
 @compiled
-def _box_segment_distance(box: Box, direction: tuple[float, float], segment: FloatArray, limit_m: float) -> float:
-    """Distance (m) of a box to a segment [2, 2] (start and end, x and y); 0 if they touch. If not below the limit,
-    any value that is not. `direction` is the cosine and sine of the heading."""
-    cosine, sine = direction
-    dx, dy = segment[0, 0] - box.x_m, segment[0, 1] - box.y_m
+def _box_segment_distance(
+    box: Box, direction: tuple[float, float], segment: tuple[float, float, float, float], limit_m: float
+) -> float:
+    """Distance (m) of a box to a segment (x and y of its start and of its end); 0 if they touch. If not below the
+    limit, any value that is not. `direction` is the cosine and sine of the heading."""
+    (cosine, sine), (start_x_m, start_y_m, end_x_m, end_y_m) = direction, segment
+    dx, dy = start_x_m - box.x_m, start_y_m - box.y_m
     u0, v0 = dx * cosine + dy * sine, dy * cosine - dx * sine
-    dx, dy = segment[1, 0] - box.x_m, segment[1, 1] - box.y_m
+    dx, dy = end_x_m - box.x_m, end_y_m - box.y_m
     u1, v1 = dx * cosine + dy * sine, dy * cosine - dx * sine
     half_length, half_width = 0.5 * box.length_m, 0.5 * box.width_m
     gap = max(min(u0, u1) - half_length, -max(u0, u1) - half_length)
@@ -182,19 +184,25 @@ def time_to_first_contact(
 
 
 @compiled
-def distance_to_nearest_segment(own: Box, segments: FloatArray, rows: IntArray, limit_m: float) -> FloatArray:
-    """[N, P] distance (m) to the nearest of the segments [S, 2, 2] listed in rows [N, P, K], at most `limit_m`.
+def distance_to_nearest_segment(
+    own: Box, segments: FloatArray, lists: tuple[IntArray, IntArray], limit_m: float
+) -> FloatArray:
+    """[N, P] distance (m) to the nearest of the segments [S, 2, 2] in each box's list, at most `limit_m`.
 
-    A list ends at its first negative row.
+    `lists` are the lists [L, K] of rows of `segments`, and the number of each box's list [N, P]. A list ends at its
+    first negative row.
     """
+    rows, of_box = lists
     nearest_m = np.full(own.x_m.shape, limit_m)
     for n, p in np.ndindex(own.x_m.shape):
-        box = _own(own, n, p)
+        box, listed = _own(own, n, p), of_box[n, p]
         direction = (cos(box.heading_rad), sin(box.heading_rad))
-        for k in range(rows.shape[2]):
-            if rows[n, p, k] < 0:
+        for k in range(rows.shape[1]):
+            row = rows[listed, k]
+            if row < 0:
                 break
-            distance = _box_segment_distance(box, direction, segments[rows[n, p, k]], nearest_m[n, p])
+            segment = (segments[row, 0, 0], segments[row, 0, 1], segments[row, 1, 0], segments[row, 1, 1])
+            distance = _box_segment_distance(box, direction, segment, nearest_m[n, p])
             nearest_m[n, p] = min(nearest_m[n, p], distance)
     return nearest_m
 

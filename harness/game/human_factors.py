@@ -264,7 +264,6 @@ class PlayersLimits:
     """The limits of the players of G games that are played together."""
 
     def __init__(self, games: int, players: int, steps: int) -> None:
-        self._games, self._players = np.arange(games)[:, None], np.arange(players)
         self._lags: IntArray = np.zeros((games, players, steps), dtype=np.int64)
         self._estimation_errors = np.zeros((games, players, steps, 2))
         self._actuator_shares = np.ones((games, players, 3))
@@ -288,8 +287,7 @@ class PlayersLimits:
 
     def lags(self, now: IntArray) -> IntArray:
         """[G, P] how many steps old is what the players know of each other in the steps `now` [G]."""
-        lags: IntArray = self._lags[self._games, self._players, np.minimum(now, self._lags.shape[2] - 1)[:, None]]
-        return lags
+        return _lags(self._lags, now)
 
     def within(self, acceleration: FloatArray, steering: FloatArray) -> tuple[FloatArray, FloatArray]:
         """[G, P] requested accelerations and steering angles, scaled by the players' actuator shares."""
@@ -298,6 +296,23 @@ class PlayersLimits:
 
     def look(self, state: State) -> None:
         """Set the players' current estimation errors in the state."""
-        now = np.minimum(state.step, self._estimation_errors.shape[2] - 1)
-        errors = self._estimation_errors[self._games, self._players, now[:, None]]
-        state.distance_error, state.closing_error_per_s = errors[..., 0].copy(), errors[..., 1].copy()
+        state.distance_error, state.closing_error_per_s = _errors(self._estimation_errors, state.step)
+
+
+@compiled
+def _lags(lags: IntArray, now: IntArray) -> IntArray:
+    """[G, P] the entries of the steps `now` [G]; after the last step, those of the last one."""
+    found = np.empty(lags.shape[:2], dtype=np.int64)
+    for g, p in np.ndindex(found.shape):
+        found[g, p] = lags[g, p, min(now[g], lags.shape[2] - 1)]
+    return found
+
+
+@compiled
+def _errors(errors: FloatArray, now: IntArray) -> FloatArray:
+    """[2, G, P] the same of estimation errors."""
+    found = np.empty((2, *errors.shape[:2]))
+    for g, p in np.ndindex(errors.shape[:2]):
+        step = min(now[g], errors.shape[2] - 1)
+        found[0, g, p], found[1, g, p] = errors[g, p, step, 0], errors[g, p, step, 1]
+    return found

@@ -56,12 +56,11 @@ def no_meetings(shape: tuple[int, ...]) -> Meetings:
 
 
 class _Body(NamedTuple):
-    """A body that a player regards: half its length, its speed, and the streams it drives in, [K]."""
+    """A body that a player regards: half its length, its speed, and in how many streams it drives."""
 
     half_m: float
     speed_mps: float
-    in_streams: IntArray
-    along_m: FloatArray  # [S] its place along each stream
+    streams: int
 
 
 class _Player(NamedTuple):
@@ -88,6 +87,7 @@ def meetings(
     numbers = np.full((5, *shape), np.inf)
     along_m = np.empty(streams.first_conflict.shape[1])
     in_streams = np.empty(len(along_m), dtype=np.int64)
+    found_streams = (in_streams, along_m, np.empty(len(along_m)))
     for g in range(shape[0]):
         for b in range(shape[2]):
             count = -1  # the streams of the body are found once, for the first player that regards it
@@ -96,12 +96,17 @@ def meetings(
                     continue
                 if count < 0:
                     pose = (among.x_m[g, b], among.y_m[g, b], among.heading_rad[g, b])
-                    count = streams_at(pose, streams, in_streams, along_m)
+                    count = streams_at(pose, streams, found_streams)
+                if count == 0:
+                    break
                 half_m = 0.5 * length_m[p]
                 ends_m = (station_m[g, p] + half_m, station_m[g, p] - half_m)
                 player = _Player(p, *ends_m, length_m[p], offset_m[g, p], speed_mps[g, p])
-                body = _Body(0.5 * among.length_m[g, b], among.speed_mps[g, b], in_streams[:count], along_m)
-                found, found_numbers, yields = _meeting(player, body, streams, signals[g])
+                body = _Body(0.5 * among.length_m[g, b], among.speed_mps[g, b], count)
+                found, other_m = _first_conflict(player, body, (in_streams, along_m), streams)
+                if found < 0:
+                    continue
+                found_numbers, yields = _meeting(player, body, (found, other_m), streams.conflicts, signals[g])
                 row[g, p, b], must_yield[g, p, b] = found, yields
                 for k, number in enumerate(found_numbers):
                     numbers[k, g, p, b] = number
@@ -110,13 +115,11 @@ def meetings(
 
 @compiled
 def _meeting(
-    player: _Player, body: _Body, streams: Streams, signals: IntArray
-) -> tuple[int, tuple[float, float, float, float, float], bool]:
-    """The conflict of a player with a body: its row, the numbers of `Meetings`, and the duty to yield."""
-    conflicts = streams.conflicts
-    found, other_m = _first_conflict(player, body, streams)
-    if found < 0:
-        return found, (np.inf, np.inf, np.inf, np.inf, np.inf), False
+    player: _Player, body: _Body, which: tuple[int, float], conflicts: FloatArray, signals: IntArray
+) -> tuple[tuple[float, float, float, float, float], bool]:
+    """The numbers of `Meetings` and the duty to yield, of a player's conflict with a body: its row, and the distance of
+    the body's front to the zone."""
+    found, other_m = which
     own_m = conflicts[found, _BEGIN_M] - player.front_m
     own_end_m = conflicts[found, _END_M] - player.front_m + player.length_m
     other_end_m = other_m + conflicts[found, _LENGTH_M] + 2.0 * body.half_m
@@ -135,39 +138,39 @@ def _meeting(
     if conflicts[found, _OTHER_LINK] >= 0 and conflicts[found, _ZONE_M] - other_m <= 0.0 and len(signals):
         other_signal = signals[int(conflicts[found, _OTHER_LINK])]
     yields = has_duty(conflicts[found], own_signal, other_signal, other_s <= own_s)
-    return found, (own_m, other_m, own_s, other_s, gap_s), yields
+    return (own_m, other_m, own_s, other_s, gap_s), yields
 
 
 @compiled
-def streams_at(pose: tuple[float, float, float], streams: Streams, in_streams: IntArray, along_m: FloatArray) -> int:
-    """The number of streams in which a body with a pose (x, y, heading) drives; written to `in_streams` in order, and
-    its place to `along_m`.
+def streams_at(
+    pose: tuple[float, float, float], streams: Streams, found: tuple[IntArray, FloatArray, FloatArray]
+) -> int:
+    """The number of streams in which a body with a pose (x, y, heading) drives.
 
-    Streams that are farther beside the body than another one by more than `_BESIDE_M` are left out: inside a junction,
-    it is on its way to leave them, or has only come near to their end.
+    `found` are arrays [S] that are written: the streams in order, the body's place along each stream, and room for its
+    distances beside them. Streams that are farther beside the body than another one by more than `_BESIDE_M` are left
+    out: inside a junction, it is on its way to leave them, or has only come near to their end.
     """
-    x_m, y_m, heading_rad = pose
+    (x_m, y_m, heading_rad), (in_streams, along_m, beside_m), samples = pose, found, streams.samples
     column = int((x_m - streams.origin_m[0]) // CELL_M)
     line = int((y_m - streams.origin_m[1]) // CELL_M)
     if column < 0 or line < 0 or column >= streams.first.shape[0] or line >= streams.first.shape[1] - 1:
         return 0
     count, nearest2, least_m = 0, np.inf, np.inf
     cosine, sine = np.cos(heading_rad), np.sin(heading_rad)
-    beside_m = np.empty(len(in_streams))
     for place in range(streams.first[column, line], streams.first[column, line + 1]):
         k = streams.rows[place]
-        sample = streams.samples[k]
-        along_x, along_y = sample[junctions.COS], sample[junctions.SIN]
-        dx, dy = x_m - sample[junctions.X_M], y_m - sample[junctions.Y_M]
+        along_x, along_y = samples[k, junctions.COS], samples[k, junctions.SIN]
+        dx, dy = x_m - samples[k, junctions.X_M], y_m - samples[k, junctions.Y_M]
         u, v = dx * along_x + dy * along_y, dy * along_x - dx * along_y
-        outside = abs(v) > sample[junctions.HALF_WIDTH_M] or abs(u) > sample[junctions.HALF_SPACING_M]
+        outside = abs(v) > samples[k, junctions.HALF_WIDTH_M] or abs(u) > samples[k, junctions.HALF_SPACING_M]
         if outside or along_x * cosine + along_y * sine < _MOST_TURNED:
             continue
         again = count > 0 and in_streams[count - 1] == streams.stream[k]
         if not again or u * u + v * v < nearest2:
             count += 0 if again else 1
             in_streams[count - 1], nearest2 = streams.stream[k], u * u + v * v
-            along_m[streams.stream[k]] = sample[junctions.ALONG_M] + u
+            along_m[streams.stream[k]] = samples[k, junctions.ALONG_M] + u
             beside_m[count - 1] = abs(v)
             least_m = min(least_m, abs(v))
     near = 0
@@ -179,18 +182,21 @@ def streams_at(pose: tuple[float, float, float], streams: Streams, in_streams: I
 
 
 @compiled
-def _first_conflict(player: _Player, body: _Body, streams: Streams) -> tuple[int, float]:
+def _first_conflict(
+    player: _Player, body: _Body, places: tuple[IntArray, FloatArray], streams: Streams
+) -> tuple[int, float]:
     """The player's first conflict with a body that neither has passed, and the distance of the body's front to the
-    zone; -1 without one."""
-    conflicts = streams.conflicts
+    zone; -1 without one. `places` are the body's streams, and its place along each stream."""
+    (in_streams, along_m), conflicts = places, streams.conflicts
     found, begin_m, other_m = -1, np.inf, np.inf
-    for s in body.in_streams:
+    for k in range(body.streams):
+        s = in_streams[k]
         for c in range(streams.first_conflict[player.player, s], streams.last_conflict[player.player, s]):
             if player.rear_m > conflicts[c, _END_M] or conflicts[c, _BEGIN_M] >= begin_m:
                 continue
             if not conflicts[c, _RIGHT_M] <= player.offset_m <= conflicts[c, _LEFT_M]:
                 continue
-            place = body.along_m[s]
+            place = along_m[s]
             if not conflicts[c, _FROM_M] <= place <= conflicts[c, _UNTIL_M]:
                 continue
             if place - body.half_m > conflicts[c, _ZONE_M] + conflicts[c, _LENGTH_M]:
@@ -248,11 +254,12 @@ def places(columns: tuple[Any, ...], table: tuple[Any, ...]) -> tuple[IntArray, 
     among, streams = Bodies(*columns), Streams(*table)
     along_m = np.empty(streams.first_conflict.shape[1])
     in_streams = np.empty(len(along_m), dtype=np.int64)
+    found_streams = (in_streams, along_m, np.empty(len(along_m)))
     steps, bodies, found, along = [0], [0], [0], [0.0]  # numba infers the types of lists from their entries
     for t, b in np.ndindex(among.present.shape):
         if among.present[t, b]:
             pose = (among.x_m[t, b], among.y_m[t, b], among.heading_rad[t, b])
-            count = streams_at(pose, streams, in_streams, along_m)
+            count = streams_at(pose, streams, found_streams)
             for k in range(count):
                 steps.append(t)
                 bodies.append(b)

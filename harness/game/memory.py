@@ -39,10 +39,10 @@ class Memory:
         """Set the motion of this step, of games that begin."""
         self._motion[self._now] = state.x_m, state.y_m, state.heading_rad, state.speed_mps
 
-    def perceived(self, bodies: Bodies, lags: IntArray) -> Perceived:
-        """The bodies as players take them to be whose knowledge of each other is so many steps old, [G, P]."""
-        lags = np.minimum(lags, len(self._motion) - 1)
-        return _perceived(tuple(bodies), self._motion, lags, (self._now, self._step_s))
+    def perceived(self, bodies: Bodies, lags: IntArray, games: IntArray) -> Perceived:
+        """The bodies of games [N] as players take them to be whose knowledge of each other is so many steps old,
+        [N, P]."""
+        return _perceived(tuple(bodies), self._motion, (lags, games), (self._now, self._step_s))
 
 
 def as_they_are(bodies: Bodies, players: int) -> Perceived:
@@ -54,22 +54,29 @@ def as_they_are(bodies: Bodies, players: int) -> Perceived:
 def _as_they_are(columns: tuple[Any, ...], players: int) -> FloatArray:
     bodies = Bodies(*columns)
     perceived = np.empty((4, bodies.present.shape[0], players, bodies.present.shape[1]))
-    for p in range(players):
-        perceived[0, :, p], perceived[1, :, p] = bodies.x_m, bodies.y_m
-        perceived[2, :, p], perceived[3, :, p] = bodies.heading_rad, bodies.speed_mps
+    for g, p in np.ndindex(perceived.shape[1:3]):
+        for b in range(bodies.present.shape[1]):
+            perceived[0, g, p, b], perceived[1, g, p, b] = bodies.x_m[g, b], bodies.y_m[g, b]
+            perceived[2, g, p, b], perceived[3, g, p, b] = bodies.heading_rad[g, b], bodies.speed_mps[g, b]
     return perceived
 
 
 @compiled
-def _perceived(columns: tuple[Any, ...], motion: FloatArray, lags: IntArray, when: tuple[int, float]) -> FloatArray:
-    perceived, (now, step_s), players = _as_they_are(columns, lags.shape[1]), when, lags.shape[1]
+def _perceived(
+    columns: tuple[Any, ...], motion: FloatArray, whose: tuple[IntArray, IntArray], when: tuple[int, float]
+) -> FloatArray:
+    (lags, games), (now, step_s), players = whose, when, motion.shape[3]
+    perceived = _as_they_are(columns, players)
     for g, p in np.ndindex(lags.shape):
-        lag = lags[g, p]
-        for b in range(players):
-            if lag > 0 and b != p:
-                x_m, y_m, heading_rad, speed_mps = motion[(now - lag) % len(motion), :, g, b]
-                moved_m = speed_mps * lag * step_s
-                perceived[0, g, p, b] = x_m + moved_m * np.cos(heading_rad)
-                perceived[1, g, p, b] = y_m + moved_m * np.sin(heading_rad)
-                perceived[2, g, p, b], perceived[3, g, p, b] = heading_rad, speed_mps
+        lag = min(lags[g, p], len(motion) - 1)
+        if lag > 0:
+            then = (now - lag) % len(motion)
+            for b in range(players):
+                if b != p:
+                    x_m, y_m = motion[then, 0, games[g], b], motion[then, 1, games[g], b]
+                    heading_rad, speed_mps = motion[then, 2, games[g], b], motion[then, 3, games[g], b]
+                    moved_m = speed_mps * lag * step_s
+                    perceived[0, g, p, b] = x_m + moved_m * np.cos(heading_rad)
+                    perceived[1, g, p, b] = y_m + moved_m * np.sin(heading_rad)
+                    perceived[2, g, p, b], perceived[3, g, p, b] = heading_rad, speed_mps
     return perceived

@@ -90,10 +90,10 @@ class Payoff:
         return total
 
     def _term_values(self, q: Quantities, player: int) -> FloatArray:
-        names, columns = self._columns
-        quantities = np.empty((len(names), len(q.state.step)))
-        for row, name in enumerate(names):
-            quantities[row] = attrgetter(name)(q)[:, player]
+        of_terms, columns = self._columns
+        quantities = np.empty((len(of_terms), len(q.state.step)))
+        for row, quantity in enumerate(of_terms):
+            quantities[row] = quantity(q)[:, player]
         return _term_values(quantities, columns, q.world.step_s)
 
     def _fuzzy_values(self, q: Quantities, player: int) -> Iterator[FloatArray]:
@@ -101,7 +101,9 @@ class Payoff:
             yield self.alpha["human"] * weight * q.world.step_s * function(getattr(q, function.quantity)[:, player])
 
     @cached_property
-    def _columns(self) -> tuple[list[str], tuple[IntArray, IntArray, FloatArray, FloatArray, BoolArray]]:
+    def _columns(
+        self,
+    ) -> tuple[list[attrgetter[FloatArray]], tuple[IntArray, IntArray, FloatArray, FloatArray, BoolArray]]:
         """The quantities of the terms without the fuzzy ones, each once, and [T] for each term: row of its quantity,
         form, the form's parameter, weight times alpha, whether it is a rate."""
         terms = [(each, TERMS[each.name]) for each in self.terms]
@@ -114,7 +116,7 @@ class Payoff:
             np.array([self.alpha[term.group] * each.weight for each, term in terms], dtype=float),
             np.array([term.per_second for _, term in terms], dtype=bool),
         )
-        return names, columns
+        return [attrgetter(name) for name in names], columns
 
 
 @compiled

@@ -178,16 +178,14 @@ class Quantities:
     def gap_s(self) -> FloatArray:
         """Time between the player's passage of a zone of conflict and that of another body, both at constant speed; inf
         without a zone that the player reaches within `meetings.HORIZON_S`."""
-        met = self.meetings
-        return np.where(met.own_s < HORIZON_S, met.gap_s, np.inf).min(-1, initial=np.inf)
+        return _gap_s(self.meetings.own_s, self.meetings.gap_s)
 
     @cached_property
     def entered_before_s(self) -> FloatArray:
         """For a player that entered a zone in this step: the least time until a body with priority is there, 0 if it is
         there already; else inf."""
         met = self.meetings
-        enters = (met.own_m <= 0.0) & (met.own_m + self.advanced_m[..., None] > 0.0)
-        return np.where(enters & met.must_yield, met.other_s, np.inf).min(-1, initial=np.inf)
+        return _entered_before_s(self.advanced_m, met.own_m, met.other_s, met.must_yield)
 
     # --- surfaces ------------------------------------------------------------------------------------------------
 
@@ -230,3 +228,23 @@ def _visible(players: BoolArray, bodies: BoolArray) -> BoolArray:
     for g, p, b in np.ndindex(visible.shape):
         visible[g, p, b] = players[g, p] and bodies[g, b] and p != b
     return visible
+
+
+@compiled
+def _gap_s(own_s: FloatArray, gap_s: FloatArray) -> FloatArray:
+    least_s = np.full(own_s.shape[:2], np.inf)
+    for g, p, b in np.ndindex(own_s.shape):
+        if own_s[g, p, b] < HORIZON_S:
+            least_s[g, p] = np.minimum(least_s[g, p], gap_s[g, p, b])
+    return least_s
+
+
+@compiled
+def _entered_before_s(
+    advanced_m: FloatArray, own_m: FloatArray, other_s: FloatArray, must_yield: BoolArray
+) -> FloatArray:
+    least_s = np.full(advanced_m.shape, np.inf)
+    for g, p, b in np.ndindex(own_m.shape):
+        if must_yield[g, p, b] and own_m[g, p, b] <= 0.0 and own_m[g, p, b] + advanced_m[g, p] > 0.0:
+            least_s[g, p] = np.minimum(least_s[g, p], other_s[g, p, b])
+    return least_s

@@ -25,7 +25,7 @@ class Rails:
 
     @classmethod
     def of(cls, segments: FloatArray, reach_m: float) -> Rails:
-        """Rails from segments [S, 2, 2]; `near` finds all segments within `reach_m` of a point."""
+        """Rails from segments [S, 2, 2]; `lists` has all segments within `reach_m` of a point."""
         segments = np.asarray(segments, dtype=float).reshape(-1, 2, 2)
         padded = np.concatenate((segments, np.full((1, 2, 2), _FAR_AWAY_M)))
         if not len(segments):
@@ -43,26 +43,27 @@ class Rails:
             cells[place][: len(rows)] = rows
         return cls(segments=padded, origin_m=low, cells=cells)
 
-    def near(self, x_m: FloatArray, y_m: FloatArray) -> IntArray:
-        """[G, P, K] rows of `segments` within reach of points [G, P], then -1."""
-        return _cells_at(x_m, y_m, self.origin_m, self.cells)
+    def lists(self, x_m: FloatArray, y_m: FloatArray) -> tuple[IntArray, IntArray]:
+        """Lists [L, K] of rows of `segments`, then -1, and the number of the list within reach of points [G, P]."""
+        count = self.cells.shape[2]
+        return self.cells.reshape(-1, count), _cells_at(x_m, y_m, self.origin_m, self.cells)
 
     def distance_m(self, cars: Box, limit_m: float) -> FloatArray:
         """[G, P] distance (m) of cars (places [G, P], sizes [P]) to the nearest rail, at most `limit_m`.
 
         `limit_m` must be within the reach of the rails.
         """
-        return distance_to_nearest_segment(cars, self.segments, self.near(cars.x_m, cars.y_m), limit_m)
+        return distance_to_nearest_segment(cars, self.segments, self.lists(cars.x_m, cars.y_m), limit_m)
 
 
 @compiled
 def _cells_at(x_m: FloatArray, y_m: FloatArray, origin_m: FloatArray, cells: IntArray) -> IntArray:
-    rows = np.empty((*x_m.shape, cells.shape[2]), dtype=cells.dtype)
+    found = np.empty(x_m.shape, dtype=np.int64)
     for g, p in np.ndindex(x_m.shape):
         column = _cell(x_m[g, p] - origin_m[0], cells.shape[0])
         line = _cell(y_m[g, p] - origin_m[1], cells.shape[1])
-        rows[g, p] = cells[column, line]
-    return rows
+        found[g, p] = column * cells.shape[1] + line
+    return found
 
 
 @compiled

@@ -141,8 +141,9 @@ class BackgroundTraffic:
             *(1 if self._recorded else _LONGEST_WAIT, self._recorded),
         )
         places, motion = read_near(search, table.sumo_name, due)
-        names = table.sumo_name.ravel()[places].tolist() if self._tiles.roads_m is not None else []
-        points = map(_libsumo.vehicle_getPosition3D, names)
+        if self._tiles.roads_m is None:
+            return self._reading(places, motion)
+        points = map(_libsumo.vehicle_getPosition3D, table.sumo_name.ravel()[places].tolist())
         near = self._tiles.on_level(points, places // table.due.shape[1])
         return self._reading(places[near], motion[:, near])
 

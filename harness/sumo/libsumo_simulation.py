@@ -191,7 +191,7 @@ class LibsumoSimulation(Simulation):
         self._placed.pop(name, None)
 
     def step(self, x_m: FloatArray, y_m: FloatArray, heading_rad: FloatArray) -> Reading:
-        seats = list(self._placed.values())
+        seats = np.fromiter(self._placed.values(), np.int64, len(self._placed))
         in_tiles_y_m = y_m + self._half_length * np.sin(heading_rad) + self._tiles.offsets_m[:, None]
         front_x = (x_m + self._half_length * np.cos(heading_rad)).ravel()[seats].tolist()
         front_y = in_tiles_y_m.ravel()[seats].tolist()

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.initial_state import InitialState
+from harness.game.jit import compiled
 from harness.road.demand.route_file import Departure
 from harness.road.net.levels import on_players_level
 
@@ -67,8 +68,9 @@ def with_game(reading: Reading | None, games: int, game: int, background: Readin
         row = getattr(background, name)
         column = row[:, :0].repeat(games, axis=0) if reading is None else getattr(reading, name)
         nothing = None if row.dtype == object else 0
-        more = np.full((games, max(most - column.shape[1], 0)), nothing, dtype=row.dtype)
-        columns[name] = np.concatenate((column, more), axis=1)
+        more = max(most - column.shape[1], 0)
+        wider = (column, np.full((games, more), nothing, dtype=row.dtype))
+        columns[name] = np.concatenate(wider, axis=1) if more else column.copy()
         columns[name][game] = nothing
         columns[name][game, :most] = row[0]
     return Reading(**columns) if reading is None else replace(reading, **columns)
@@ -91,18 +93,30 @@ def reading_of(
 ) -> Reading:
     """The reading of bodies [n], sorted by their game: names, types, motion [4, n] (x_m and y_m of the front bumper,
     heading_rad, speed_mps) and sizes [2, n] (length and width)."""
-    column = np.arange(len(of_game)) - np.searchsorted(of_game, of_game)
-    shape = (games, int(column.max(initial=-1)) + 1)
-    words, numbers = np.full((2, *shape), None, dtype=object), np.zeros((6, *shape))
-    present = np.zeros(shape, dtype=bool)
-    words[0, of_game, column], words[1, of_game, column] = names, types
     (front_x_m, front_y_m, heading_rad, speed_mps), (length_m, width_m) = motion, np.array(sizes_m)
     back_x_m, back_y_m = 0.5 * length_m * np.cos(heading_rad), 0.5 * length_m * np.sin(heading_rad)
     values = (front_x_m - back_x_m, front_y_m - back_y_m, heading_rad, speed_mps, length_m, width_m)
-    numbers[:, of_game, column] = values
-    present[of_game, column] = True
+    column, numbers, present = _padded(np.array(values), of_game, games)
+    words = np.full((2, *present.shape), None, dtype=object)
+    words[0, of_game, column], words[1, of_game, column] = names, types
     x_m, y_m, heading_rad, speed_mps, length_m, width_m = numbers
     return Reading(words[0], words[1], x_m, y_m, heading_rad, speed_mps, length_m, width_m, present)
+
+
+@compiled
+def _padded(values: FloatArray, of_game: IntArray, games: int) -> tuple[IntArray, FloatArray, BoolArray]:
+    """The column [n] of each body in its game, the values [V, n] of the bodies as [V, G, M], and [G, M] where a body
+    is. `of_game` [n] is sorted."""
+    column, most = np.zeros(len(of_game), dtype=np.int64), min(len(of_game), 1)
+    for k in range(1, len(of_game)):
+        column[k] = column[k - 1] + 1 if of_game[k] == of_game[k - 1] else 0
+        most = max(most, column[k] + 1)
+    numbers, present = np.zeros((len(values), games, most)), np.zeros((games, most), dtype=np.bool_)
+    for k in range(len(of_game)):
+        present[of_game[k], column[k]] = True
+        for row in range(len(values)):
+            numbers[row, of_game[k], column[k]] = values[row, k]
+    return column, numbers, present
 
 
 def distance_to_player_m(fronts_m: FloatArray, of_game: IntArray, players: Players) -> FloatArray:

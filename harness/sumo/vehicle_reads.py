@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import chain
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from libsumo import _libsumo  # the same functions without Python wrappers, for frequent calls
@@ -41,7 +41,7 @@ def read_near(search: NearSearch, names: NDArray[np.object_], due: IntArray) -> 
     named = names.ravel()[due].tolist()
     fronts = np.fromiter(chain.from_iterable(map(_libsumo.vehicle_getPosition, named)), float, 2 * len(due))
     fronts_m = fronts.reshape(-1, 2)
-    near = _near(search, due, fronts_m)
+    near = _near(tuple(search), due, fronts_m)
     named = [named[k] for k in near.tolist()]
     motion = np.empty((4, len(near)))
     motion[:2] = fronts_m[near].T
@@ -51,14 +51,14 @@ def read_near(search: NearSearch, names: NDArray[np.object_], due: IntArray) -> 
 
 
 @compiled
-def _near(search: NearSearch, due: IntArray, fronts_m: FloatArray) -> IntArray:
+def _near(columns: tuple[Any, ...], due: IntArray, fronts_m: FloatArray) -> IntArray:
     """[m] indices of the vehicles that may be near a player, of those at flat places [n] with front bumpers [n, 2].
 
     In place: the y of the bumpers loses the offset of the tile, and `due_in` becomes the step in which to read a
     vehicle again. A near vehicle is due in the next step, any other in the first step in which it may have come near,
     at most `longest_wait` steps from now.
     """
-    near, count = np.empty(len(due), dtype=np.int64), 0
+    search, near, count = NearSearch(*columns), np.empty(len(due), dtype=np.int64), 0
     room = search.due_in.shape[1]
     for k, place in enumerate(due):
         game, column = place // room, place % room

@@ -84,9 +84,9 @@ def test_nearest_segment__is_the_least_distance_of_the_rows(
     a: Box, ends: list[tuple[float, float, float, float]], limit: float
 ) -> None:
     segments = np.array([segment(*each) for each in ends])
-    rows = np.arange(0, len(ends), 2)[None, None]  # every second segment
-    distances = [polygon_of(a).distance(shapely.LineString(segments[k])) for k in rows[0, 0]]
-    found = distance_to_nearest_segment(players(a), segments, rows, limit)
+    rows = np.arange(0, len(ends), 2)[None]  # every second segment
+    distances = [polygon_of(a).distance(shapely.LineString(segments[k])) for k in rows[0]]
+    found = distance_to_nearest_segment(players(a), segments, (rows, np.zeros((1, 1), dtype=np.int64)), limit)
     assert found[0, 0] == pytest.approx(min([*distances, limit]), abs=1e-6)
 
 

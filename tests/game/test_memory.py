@@ -29,7 +29,7 @@ def moving_east(speeds_mps: list[float], step_s: float) -> tuple[Memory, Bodies]
 def test_perceived__is_where_they_would_be_had_they_moved_on() -> None:
     # 10 m/s for 5 steps of 0.1 s, 5 m, then 4 m/s for 5 steps, 2 m
     memory, bodies = moving_east([10.0] * 5 + [4.0] * 5, 0.1)
-    x_m, _, _, speed_mps = memory.perceived(bodies, np.array([[0, 5]]))
+    x_m, _, _, speed_mps = memory.perceived(bodies, np.array([[0, 5]]), np.arange(1))
     assert x_m[0, 0].tolist() == pytest.approx([7.0, 7.0, 50.0])  # without a lag as it is
     assert x_m[0, 1].tolist() == pytest.approx([5.0 + 10.0 * 0.5, 7.0, 50.0])  # itself and the background as they are
     assert speed_mps[0, 1].tolist() == pytest.approx([10.0, 4.0, 0.0])
@@ -38,7 +38,7 @@ def test_perceived__is_where_they_would_be_had_they_moved_on() -> None:
 def test_perceived__of_steady_motion_is_as_it_is_for_every_lag() -> None:
     memory, bodies = moving_east([10.0] * 40, 0.1)
     for lag in range(40):
-        found = memory.perceived(bodies, np.full((1, 2), lag))
+        found = memory.perceived(bodies, np.full((1, 2), lag), np.arange(1))
         assert found == pytest.approx(as_they_are(bodies, 2))
 
 
@@ -47,5 +47,5 @@ def test_memory__reaches_as_far_back_in_short_steps() -> None:
     for step_s in (0.02, 0.1, 0.2):
         before = round(REMEMBERED_S / step_s) - 1  # the step itself is remembered too
         memory, bodies = moving_east([10.0] * 3 + [0.0] * before, step_s)
-        speed_mps = memory.perceived(bodies, np.full((1, 2), 10 * before))[3]
+        speed_mps = memory.perceived(bodies, np.full((1, 2), 10 * before), np.arange(1))[3]
         assert speed_mps[0, 0, 1] == 10.0

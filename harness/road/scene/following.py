@@ -7,7 +7,9 @@ from functools import cached_property
 from itertools import pairwise
 from math import atan2
 
+import numpy as np
 import shapely
+from numpy.typing import NDArray
 from sumolib.net.lane import Lane
 
 from harness.errors import UsageError
@@ -48,6 +50,11 @@ class _Stretch:
         """The middle of the lane."""
         return shapely.LineString(self.line)
 
+    @cached_property
+    def shape_m(self) -> float:
+        """The length of the middle of the lane."""
+        return float(self.shape.length)
+
 
 @dataclass(frozen=True, kw_only=True)
 class RoadBehind:
@@ -56,6 +63,11 @@ class RoadBehind:
     edges: tuple[str, ...] = ()
     lanes: dict[str, _Stretch] = field(default_factory=dict)
 
+    @cached_property
+    def _shapes(self) -> NDArray[np.object_]:
+        """The middles of the lanes."""
+        return np.array([lane.shape for lane in self.lanes.values()])
+
     def follower(self, start: InitialState, length_m: float) -> Departure | None:
         """The vehicle that follows an ego of this length from its start; None if nobody does.
 
@@ -63,13 +75,14 @@ class RoadBehind:
         """
         if start.follower is None or not self.lanes:
             return None
-        centre, speed_mps = shapely.Point(start.x_m[EGO], start.y_m[EGO]), float(start.speed_mps[EGO])
-        lane = min(self.lanes.values(), key=lambda each: float(each.shape.distance(centre)))
-        if lane.shape.distance(centre) > _ON_LANE_M:
+        speed_mps = float(start.speed_mps[EGO])
+        centre = shapely.points(start.x_m[EGO], start.y_m[EGO])
+        distances_m = shapely.distance(self._shapes, centre)
+        if distances_m.min() > _ON_LANE_M:
             return None
-        scale = lane.length_m / lane.shape.length
+        lane = list(self.lanes.values())[distances_m.argmin()]
         behind_m = 0.5 * length_m + start.follower.gap_m(speed_mps)
-        front_m = float(lane.shape.project(centre)) * scale - behind_m
+        front_m = float(shapely.line_locate_point(lane.shape, centre)) * (lane.length_m / lane.shape_m) - behind_m
         while front_m < (0.0 if lane.before else _CAR_LENGTH_M):
             if not lane.before:
                 return None
@@ -89,13 +102,14 @@ class RoadBehind:
 
 
 def _motion(lane: _Stretch, front_m: float, speed_mps: float) -> Motion:
-    along_m = front_m * lane.shape.length / lane.length_m
+    along_m = front_m * lane.shape_m / lane.length_m
     places = (along_m, along_m - _AHEAD_M) if along_m > _AHEAD_M else (along_m + _AHEAD_M, along_m)
-    (x, y), (x_behind, y_behind) = (lane.shape.interpolate(place).coords[0] for place in places)
-    front = lane.shape.interpolate(along_m)
+    points = shapely.get_coordinates(shapely.line_interpolate_point(lane.shape, places)).tolist()
+    (x, y), (x_behind, y_behind) = points
+    front_x, front_y = points[places.index(along_m)]
     return Motion(
-        x_m=front.x,
-        y_m=front.y,
+        x_m=front_x,
+        y_m=front_y,
         heading_rad=atan2(y - y_behind, x - x_behind),
         speed_mps=speed_mps,
         length_m=_CAR_LENGTH_M,
