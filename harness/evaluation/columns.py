@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from harness.evaluation.column import COUNT, FLAG, MAYBE, NUMBER, OF_METRIC, P_VALUE, POINTS, SHARE, TEXT, Column
 from harness.evaluation.measured_game import METRICS_OF_CONDUCT, METRICS_OF_GAMES, METRICS_OF_PLAYERS
+from harness.evaluation.severity.closeness import CRITERIA
 
 _EXACT, _T = "95 % Clopper-Pearson interval", "95 % t interval"
 _PAPER = "the paper, section 4.2"
@@ -70,7 +71,10 @@ def _summary() -> Iterator[Column]:
     interval = f"{_EXACT} (empty with several people)"
     yield from _rate("non_ego_goal_rate", "Share of the people that reached their goals.", interval)
     yield from _means("person")
-    yield from _rate("near_miss_rate", "Share of the games with a near miss.")
+    yield from _rate("near_miss_rate", "Share of the games with a near miss, by any criterion.")
+    for criterion in CRITERIA:
+        meaning = f"Near misses by a {criterion.bound}. A game can meet several criteria."
+        yield Column(f"near_misses_by_{criterion.name}", MAYBE, meaning)
 
 
 _STRATEGIES = (Column("ego", TEXT, "The strategy of the ego."), Column("non_ego", TEXT, "That of the non-ego."))

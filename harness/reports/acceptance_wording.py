@@ -50,13 +50,14 @@ def acceptance_lines(checks: Sequence[Check], seeds: int) -> list[Line]:
 
 
 def sentence(check: Check) -> str:
-    """What was measured and where, the end of the interval, and the bound."""
+    """What was measured and where, the end of the interval, the bound, and what the value is made of."""
     if not check.measured:
         return "not measured" if check.games else f"not measured: {check.arm} was not played"
     value, limit, allowed = (_value(check.bound, each) for each in (check.value, check.limit, check.allowed))
-    return (
+    words = (
         f"{value} in {check.games:,} games of {check.arm}; with {SURE} confidence at most {limit}; allowed: {allowed}"
     )
+    return f"{words}; {check.detail}" if check.detail else words
 
 
 def headline(checks: Sequence[Check]) -> str:

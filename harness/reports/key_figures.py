@@ -10,12 +10,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from harness.evaluation.comparisons.near_misses import by_criterion, near_misses
 from harness.evaluation.strategies import Arm, EgoStrategy, PersonaNonEgo
 from harness.game.human_factors import Attention
 from harness.game.roles import NON_EGO
 from harness.reports.differences import NO_RELEVANT_DIFFERENCE, faster_by, is_equivalent
 from harness.reports.numbers import NO_SPACE, number, percent, sure
-from harness.reports.run_tables import RunTables
+from harness.reports.run_tables import RunTables, played
 from harness.reports.verdict_wording import Answer
 
 NEAR_MISSES = "Near misses"
@@ -68,10 +69,11 @@ def _preventable(persona: str, tables: RunTables) -> Iterator[KeyFigure]:
 def _near_misses(persona: str, tables: RunTables) -> Iterator[KeyFigure]:
     lines, last = [], 0.0
     for _, made, arm in egos_of(persona, tables):
-        marks = tables.games_of(arm)["near_miss"].dropna()
-        if len(marks):
-            last = float(marks.mean())
-            lines.append(f"{int(marks.sum())} of {len(marks)} games of the {made} ({percent(last)})")
+        rows = [row for row in tables.rates_of(arm).values() if row["near_miss_rate"] >= 0.0]
+        if rows:
+            near, games = sum(map(near_misses, rows)), sum(map(played, rows))
+            last = near / games
+            lines.append(f"{near} of {games} games of the {made} ({percent(last)}): {by_criterion(rows)}")
     yield KeyFigure(title=NEAR_MISSES, lines=lines, warns=last >= OFTEN)
 
 

@@ -20,17 +20,20 @@ from harness.reports.numbers import NO_SPACE
 from harness.reports.run_tables import RunTables
 from harness.reports.verdict_wording import answer
 from tests.support.game_tables import arm, table
-from tests.support.pages import campaign
+from tests.support.pages import campaign, recomputed
 
 
 def found(arguments, near_misses=None):
-    """The looked-up tables of a made-up campaign; `near_misses` are the shares of an arm's games that come close."""
+    """The looked-up tables of a made-up campaign; `near_misses` are the shares of an arm's games that come close, by
+    time to collision."""
     episodes = arguments["episodes"]
     for name, share in (near_misses or {}).items():
         rows = episodes["arm"] == name
         marks = [int(place < share * rows.sum()) for place in range(int(rows.sum()))]
-        episodes.loc[rows, "near_miss"] = pd.Series(marks, index=episodes.index[rows], dtype="Int64")
-    return RunTables(**arguments)
+        for column in ("near_miss", "near_miss_ttc", "near_miss_pet", "near_miss_headway"):
+            values = marks if column in ("near_miss", "near_miss_ttc") else [0] * len(marks)
+            episodes.loc[rows, column] = pd.Series(values, index=episodes.index[rows], dtype="Int64")
+    return RunTables(**(recomputed(arguments) if near_misses else arguments))
 
 
 def figures_of(run):
@@ -52,8 +55,8 @@ def test_near_misses__of_an_ego_without_failures_are_on_its_card():
     run = found(campaign(personas=["speedy"]), {"naive_vs_speedy": 0.1, "retrained_vs_speedy": 0.95})
     figure = figures_of(run)[NEAR_MISSES]
     assert [line.replace(NO_SPACE, " ") for line in figure.lines] == [
-        "6 of 60 games of the naive ego (10 %)",
-        "57 of 60 games of the retrained ego (95 %)",
+        "6 of 60 games of the naive ego (10 %): 6 by time to collision of at most 1.5 s",
+        "57 of 60 games of the retrained ego (95 %): 57 by time to collision of at most 1.5 s",
     ]
     assert figure.warns
 

@@ -26,11 +26,13 @@ from harness.evaluation.comparisons.comparison import (
     measured_values,
     rate_cells,
 )
+from harness.evaluation.comparisons.near_misses import ANY_CRITERION
 from harness.game.arrays import FloatArray
 
-MEASURES = {"failures": "ego_failed", "near misses": "near_miss", "average speed": "ego_mean_speed_mps"}
+_NEAR_MISSES = f"near misses by {ANY_CRITERION}"
+MEASURES = {"failures": "ego_failed", _NEAR_MISSES: "near_miss", "average speed": "ego_mean_speed_mps"}
 """What is compared, and its column in episodes.csv."""
-RATES = ("failures", "near misses")
+RATES = ("failures", _NEAR_MISSES)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,6 +8,7 @@ import pandas as pd
 from harness.evaluation.columns import MEANS
 from harness.evaluation.comparisons.comparison import mean_interval, rate_cells
 from harness.evaluation.people import of_people
+from harness.evaluation.severity.closeness import CRITERIA
 from harness.evaluation.tables import table_of, typed
 
 
@@ -36,7 +37,7 @@ def _summary_row(arm: str, persona: str, seed: int, games: pd.DataFrame) -> dict
     outcomes = of_people(played, "outcome")
     took_part = (outcomes != "").to_numpy()
     people = outcomes.to_numpy()[took_part]
-    near_misses = played["near_miss"].dropna()
+    came_close = played["near_miss"].dropna()
     speed_low, speed_high = mean_interval(played["ego_mean_speed_mps"].dropna().to_numpy())
     goal_rate = rate_cells("non_ego_goal_rate", (people == "goal").sum(), len(people))
     if len(people) > took_part.any(axis=1).sum():  # several people in a game
@@ -59,5 +60,6 @@ def _summary_row(arm: str, persona: str, seed: int, games: pd.DataFrame) -> dict
             for name in MEANS
             if "person" in MEANS[name].whose
         },
-        **rate_cells("near_miss_rate", near_misses.sum(), len(near_misses)),
+        **rate_cells("near_miss_rate", came_close.sum(), len(came_close)),
+        **{f"near_misses_by_{each.name}": played[f"near_miss_{each.name}"].sum(min_count=1) for each in CRITERIA},
     }
