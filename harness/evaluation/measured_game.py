@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from harness.evaluation import conduct  # enters its metrics
+from harness.evaluation import conduct, harm  # they enter their metrics
 from harness.evaluation.metrics import METRICS, Drive
 from harness.evaluation.people import COLLIDED_WITH
 from harness.evaluation.recorded_game import RecordedGame
@@ -15,7 +15,8 @@ from harness.game.roles import EGO, ROLES
 METRICS_OF_PLAYERS = tuple(each for each in METRICS if {"ego", "person"} & {*each.whose})
 METRICS_OF_CONDUCT = tuple(each for each in METRICS if "conduct" in each.whose)
 METRICS_OF_GAMES = tuple(each for each in METRICS if not {"ego", "person", "conduct"} & {*each.whose})
-assert conduct  # used for what its import enters
+assert conduct  # used for what its import enters, as are these
+assert harm
 assert measures
 
 

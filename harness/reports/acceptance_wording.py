@@ -14,6 +14,7 @@ TITLES = {
     "failure_rate_alone": "failures without the non-ego",
     "preventable_failure_rate": "preventable failures",
     "near_miss_rate": "near misses",
+    "harm_to_others_rate": "harm to others",
     "speed_loss_mps": "average speed lost",
     "gap_share": "best-response gap of the ego",
 }

@@ -11,7 +11,7 @@ import pytest
 from harness.assessment.rollout import assess
 from harness.drivers.sumo import SumoDriver
 from harness.game.arrays import FloatArray, IntArray
-from harness.road.scene.following import FOLLOWER
+from harness.game.follower import FOLLOWER
 from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.rollouts import Steady, arm, play, trace
 

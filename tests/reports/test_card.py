@@ -8,6 +8,7 @@ import pytest
 from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.strategies import Arm, NaiveEgo, PersonaNonEgo, RetrainedEgo, against_persona
 from harness.reports.key_figures import (
+    HARM_TO_OTHERS,
     NEAR_MISSES,
     PARTLY,
     PRICE,
@@ -66,6 +67,38 @@ def test_verdict__an_ego_that_comes_too_close_is_mended_only_in_part(share, labe
     run = found(campaign(personas=["speedy"]), {"retrained_vs_speedy": share})
     shown = card_verdict("Did retraining fix it?", answer(run, "RQ2", "speedy"), key_figures("speedy", run))
     assert (shown["label"], shown["tone"], bool(shown["caution"])) == (label, tone, label == PARTLY)
+
+
+def harmed(beside_naive, beside_retrained):
+    """A campaign in which so many of 60 people fail without the ego."""
+    arguments = campaign(personas=["speedy"])
+    episodes = arguments["episodes"]
+    for name, count in (("naive_vs_speedy", beside_naive), ("retrained_vs_speedy", beside_retrained)):
+        rows = episodes["arm"] == name
+        marks = pd.Series([1] * count + [0] * (60 - count), index=episodes.index[rows], dtype="Int64")
+        for column in ("person_failed", "harm_to_others"):
+            episodes.loc[rows, column] = marks
+        episodes.loc[rows, "follower_max_deceleration_mps2"] = 2.0 + count / 20.0
+    return found(recomputed(arguments))
+
+
+def test_harm__that_retraining_leaves_to_others_makes_the_answer_partly():
+    run = harmed(1, 20)
+    figure = figures_of(run)[HARM_TO_OTHERS]
+    assert figure.lines == [
+        "at its strongest the follower brakes by 3.0 m/s² beside the retrained ego, and by 2.0 m/s² beside the naive "
+        "ego (mean over the games)",
+        "a person fails in 20 of 60 games beside the retrained ego, and in 1 of 60 beside the naive ego",
+    ]
+    assert figure.warns
+    shown = card_verdict("Did retraining fix it?", answer(run, "RQ2", "speedy"), key_figures("speedy", run))
+    assert (shown["label"], shown["tone"]) == (PARTLY, "open")
+    assert shown["caution"] == f"But harm to others: {figure.lines[-1]}."
+
+
+@pytest.mark.parametrize(("before", "after"), [(14, 15), (20, 1), (0, 0)])
+def test_harm__that_does_not_grow_is_no_warning(before, after):
+    assert not figures_of(harmed(before, after))[HARM_TO_OTHERS].warns
 
 
 @pytest.mark.parametrize(("drives", "who"), [(True, "The speedy driver"), (False, "The speedy")])

@@ -17,6 +17,7 @@ import numpy as np
 import pandas as pd
 
 from harness.evaluation.comparisons.comparison import games_by_arm, mean_interval, pairs_of
+from harness.evaluation.comparisons.harm_clauses import Beside, harm_clauses
 from harness.evaluation.comparisons.near_misses import by_criterion
 from harness.evaluation.comparisons.preventability import ANY
 from harness.evaluation.strategies import (
@@ -169,7 +170,8 @@ def _measured(bound: str, subject: Subject, evidence: Evidence) -> Iterator[Meas
                 if bound == "preventable_failure_rate":
                     yield _preventable(arm, subject.seed, evidence)
                 else:
-                    yield _rate(bound, arm, subject.seed, evidence)
+                    measured = _rate(bound, arm, subject.seed, evidence)
+                    yield measured._replace(detail=_detail(bound, arm, subject, evidence))
 
 
 def _arms_against(subject: Subject, evidence: Evidence) -> list[str]:
@@ -189,10 +191,25 @@ def _rate(column: str, arm: str, seed: int, evidence: Evidence) -> Measured:
     row = evidence.rows.get((arm, seed))
     if row is None:
         return Measured(arm, np.nan, np.nan, 0)
-    measured = Measured(arm, row[column], row[f"{column}_high"], row["episodes"] - row["errors"])
-    if column == "near_miss_rate" and np.isfinite(measured.value):
-        return measured._replace(detail=by_criterion([row]))
-    return measured
+    return Measured(arm, row[column], row[f"{column}_high"], row["episodes"] - row["errors"])
+
+
+def _detail(bound: str, arm: str, subject: Subject, evidence: Evidence) -> str:
+    """What a rate in an arm is made of; for harm to others also what it is beside the naive ego."""
+    row = evidence.rows.get((arm, subject.seed))
+    if row is None or not np.isfinite(row[bound]):
+        return ""
+    match bound:
+        case "near_miss_rate":
+            return by_criterion([row])
+        case "harm_to_others_rate":
+            egos = [Beside("this ego", [row])]
+            naive = evidence.rows.get((against_persona(NaiveEgo(), subject.persona).name, subject.seed))
+            if naive is not None and subject.ego != NaiveEgo():
+                egos.append(Beside("the naive ego", [naive]))
+            return "; ".join(harm_clauses(*egos).values())
+        case _:
+            return ""
 
 
 def _preventable(arm: str, seed: int, evidence: Evidence) -> Measured:

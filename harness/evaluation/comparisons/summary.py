@@ -61,5 +61,17 @@ def _summary_row(arm: str, persona: str, seed: int, games: pd.DataFrame) -> dict
             if "person" in MEANS[name].whose
         },
         **rate_cells("near_miss_rate", came_close.sum(), len(came_close)),
+        **_harm(played),
         **{f"near_misses_by_{each.name}": played[f"near_miss_{each.name}"].sum(min_count=1) for each in CRITERIA},
+    }
+
+
+def _harm(played: pd.DataFrame) -> dict[str, object]:
+    """The columns of harm to others than the ego."""
+    marks = played["harm_to_others"].dropna()
+    return {
+        "person_failures": played["person_failed"].sum(min_count=1),
+        "bystander_failures": played["bystander_failed"].sum(min_count=1),
+        **rate_cells("harm_to_others_rate", marks.sum(), len(marks)),
+        "follower_max_deceleration_mps2": played["follower_max_deceleration_mps2"].mean(),
     }
