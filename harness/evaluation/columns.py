@@ -40,6 +40,9 @@ _FAILED = "Share of the games in which the ego failed."
 _FAILURE_RATE = Column("failure_rate", NUMBER, _FAILED, unit=SHARE)
 
 
+_GREATER = "the greater of ego_delta_v_mps and other_delta_v_mps."
+
+
 def _outcome(role: str, who: str) -> Column:
     kinds = "`goal`, `collision` (with a road user), `rail` (with the edge of the drivable area), `timeout` or `error`"
     return Column(f"{role}_outcome", TEXT, f"How the {who}'s game ended: {kinds}; empty without one.")
@@ -83,6 +86,14 @@ def _summary() -> Iterator[Column]:
     yield Column("person_failures", MAYBE, "Games with person_failed: a person fails in a contact without the ego.")
     yield Column("bystander_failures", MAYBE, "Games with bystander_failed: background traffic does.")
     yield from _rate("harm_to_others_rate", "Share of the games with harm_to_others: a person or a bystander does.")
+    meaning = "Mean over the collisions of the closing speed with the road user that the ego touched."
+    yield Column("closing_speed_mps", NUMBER, meaning)
+    yield Column("delta_v_mps", NUMBER, f"Mean over the collisions of {_GREATER}")
+    yield Column("max_delta_v_mps", NUMBER, f"The greatest value over the collisions of {_GREATER}")
+    for end, bound in (("low", "lower"), ("high", "upper")):
+        meaning = f"Mean of mais3_risk_{end} over the collisions in which it is known: the {bound} bound of the "
+        meaning += "probability that a collision injures somebody seriously (MAIS3+)."
+        yield Column(f"mais3_risk_{end}", NUMBER, meaning, unit=SHARE)
     meaning = "Mean over the games of the strongest braking of the vehicle that follows the ego; empty without one."
     yield Column("follower_max_deceleration_mps2", NUMBER, meaning)
 

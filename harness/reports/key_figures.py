@@ -20,8 +20,10 @@ from harness.game.roles import NON_EGO
 from harness.reports.differences import NO_RELEVANT_DIFFERENCE, faster_by, is_equivalent
 from harness.reports.numbers import NO_SPACE, number, percent, sure
 from harness.reports.run_tables import RunTables, played
+from harness.reports.severity_wording import severity_clause
 from harness.reports.verdict_wording import Answer
 
+SEVERITY = "Severity of collisions"
 NEAR_MISSES = "Near misses"
 HARM_TO_OTHERS = "Harm to others"
 WORST_KNOWN_OPPONENT = "Against its worst known opponent"
@@ -42,7 +44,7 @@ class KeyFigure:
 
 def key_figures(persona: str, tables: RunTables) -> list[KeyFigure]:
     """The lines of a persona's card, those that can be measured."""
-    parts = (_causes, _preventable, _near_misses, _harm, _worst_opponent, _price)
+    parts = (_causes, _severity, _preventable, _near_misses, _harm, _worst_opponent, _price)
     return [figure for part in parts for figure in part(persona, tables) if figure.lines]
 
 
@@ -68,6 +70,11 @@ def _preventable(persona: str, tables: RunTables) -> Iterator[KeyFigure]:
             rate = f"{percent(row['from_start_rate'])} of its games, {share}"
             lines.append(f"{_seed(row['seed'], tables)}{count} by a reference driver in its seat ({rate})")
     yield KeyFigure(title="Preventable", lines=lines)
+
+
+def _severity(persona: str, tables: RunTables) -> Iterator[KeyFigure]:
+    clauses = [severity_clause(made, list(tables.rates_of(arm).values())) for _, made, arm in egos_of(persona, tables)]
+    yield KeyFigure(title=SEVERITY, lines=[clause for clause in clauses if clause])
 
 
 def _near_misses(persona: str, tables: RunTables) -> Iterator[KeyFigure]:

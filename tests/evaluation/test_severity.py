@@ -59,13 +59,19 @@ def cells_of(world: World, trace: pd.DataFrame) -> dict[str, Any]:
         (
             14.0,
             rows("non_ego", along(26.5, -1.6, 0.0, 4.0, 3)),
-            {"closing_speed_mps": 10.0, "ego_delta_v_mps": 5.0, "other_delta_v_mps": 5.0, "severity": 305.0},
+            {
+                "mais3_risk_high": 0.1,
+                "closing_speed_mps": 10.0,
+                "ego_delta_v_mps": 5.0,
+                "other_delta_v_mps": 5.0,
+                "severity": 305.0,
+            },
         ),
         # 70 kg at rest, 1500 kg at 10 m/s: 10 * 1500 / 1570 = 9.554
         (
             10.0,
             rows("walker", along(24.5, -1.6, QUARTER, 0.0, 3), kind="foot"),
-            {"other_delta_v_mps": 9.554, "severity": 309.554},
+            {"other_delta_v_mps": 9.554, "severity": 309.554, "mais3_risk_low": 0.1},  # 36 km/h
         ),
         # ego 12 m/s east, the other 5 m/s north: 13 m/s; it reaches the ego's right side at y = -1.6 - 0.9
         (

@@ -61,8 +61,20 @@ def _summary_row(arm: str, persona: str, seed: int, games: pd.DataFrame) -> dict
             if "person" in MEANS[name].whose
         },
         **rate_cells("near_miss_rate", came_close.sum(), len(came_close)),
+        **_severity(played),
         **_harm(played),
         **{f"near_misses_by_{each.name}": played[f"near_miss_{each.name}"].sum(min_count=1) for each in CRITERIA},
+    }
+
+
+def _severity(played: pd.DataFrame) -> dict[str, object]:
+    """The columns of the collisions' severity."""
+    delta_v_mps = played[["ego_delta_v_mps", "other_delta_v_mps"]].max(axis=1)
+    return {
+        "closing_speed_mps": played["closing_speed_mps"].mean(),
+        "delta_v_mps": delta_v_mps.mean(),
+        "max_delta_v_mps": delta_v_mps.max(),
+        **{name: played[name].mean() for name in ("mais3_risk_low", "mais3_risk_high")},
     }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -12,38 +13,63 @@ from harness.evaluation.severity import contact
 from harness.evaluation.severity import limits as at
 from harness.game.outcome import Outcome
 
+Side: TypeAlias = Literal["front", "left", "rear", "right"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hit:
+    """One of the two bodies of a contact."""
+
+    vehicle_class: str
+    """Of SUMO; empty: an obstacle."""
+    side: Side
+    """The side of its box that is hit."""
+    delta_v_mps: float
+    """Change of its velocity, if both move on as one."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Impact:
-    """A contact of two bodies at the end of a game; None of everything without one."""
+    """A contact of two bodies at the end of a game."""
 
-    closing_mps: float | None = None
-    own_delta_v_mps: float | None = None
-    """Change of the player's velocity, if both move on as one."""
-    other_delta_v_mps: float | None = None
-    side: str | None = None
+    closing_mps: float
+    own: Hit
+    other: Hit
+
+    @property
+    def delta_v_mps(self) -> float:
+        """The greater change of velocity."""
+        return max(self.own.delta_v_mps, self.other.delta_v_mps)
 
 
-def impact_of(game: RecordedGame, player: int) -> Impact:
-    """The contact that ends a player's game, with the body that is nearest then."""
+def impact_of(game: RecordedGame, player: int) -> Impact | None:
+    """The contact with a road user that ends a player's game, with the body that is nearest then; None without one."""
     last = game.last_step(player)
     if game.outcomes[player] is not Outcome.COLLISION or last is None or (other := game.nearest(last, player)) is None:
-        return Impact()
-    relative = game.velocity_mps(last, other) - game.velocity_mps(last, player)
-    closing_mps = float(np.hypot(*relative))
-    own_kg, other_kg = (at.mass_kg(game.body_kinds[body].vehicle_class) for body in (player, other))
-    if game.names[other] in game.obstacles:
-        other_kg = math.inf
-    angle_rad = contact.impact_angle_rad(game.box(last, player), game.box(last, other), *relative.tolist())
-    return Impact(
-        closing_mps=closing_mps,
-        own_delta_v_mps=closing_mps / (1.0 + own_kg / other_kg),
-        other_delta_v_mps=closing_mps / (1.0 + other_kg / own_kg),
-        side=side_of(angle_rad),
-    )
+        return None
+    closing_mps = float(np.hypot(*(game.velocity_mps(last, other) - game.velocity_mps(last, player))))
+
+    def hit(body: int, by: int) -> Hit:
+        relative = game.velocity_mps(last, by) - game.velocity_mps(last, body)
+        angle_rad = contact.impact_angle_rad(game.box(last, body), game.box(last, by), *relative.tolist())
+        return Hit(
+            vehicle_class=_class_of(game, body),
+            side=side_of(angle_rad),
+            delta_v_mps=closing_mps / (1.0 + _mass_kg(game, body) / _mass_kg(game, by)),
+        )
+
+    return Impact(closing_mps=closing_mps, own=hit(player, other), other=hit(other, player))
 
 
-def side_of(angle_rad: float) -> str:
+def _class_of(game: RecordedGame, body: int) -> str:
+    return "" if game.names[body] in game.obstacles else game.body_kinds[body].vehicle_class
+
+
+def _mass_kg(game: RecordedGame, body: int) -> float:
+    return math.inf if game.names[body] in game.obstacles else at.mass_kg(game.body_kinds[body].vehicle_class)
+
+
+def side_of(angle_rad: float) -> Side:
     """The side of a box that is hit from a direction in its frame: 0 from ahead, counter-clockwise."""
     if abs(angle_rad) <= 0.25 * math.pi:
         return "front"

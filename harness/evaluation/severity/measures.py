@@ -30,7 +30,8 @@ _MINDERHOUD = "Minderhoud and Bovy 2001, Extended time-to-collision measures for
     source="Brach and Brach 2011, Vehicle accident analysis and reconstruction methods: closing velocity",
 )
 def closing_speed_mps(drive: Drive) -> float | None:
-    return impact_of(drive.game, drive.player).closing_mps
+    impact = impact_of(drive.game, drive.player)
+    return impact.closing_mps if impact is not None else None
 
 
 @metric(
@@ -41,7 +42,8 @@ def closing_speed_mps(drive: Drive) -> float | None:
     source=_SHELBY,
 )
 def ego_delta_v_mps(drive: Drive) -> float | None:
-    return impact_of(drive.game, drive.player).own_delta_v_mps
+    impact = impact_of(drive.game, drive.player)
+    return impact.own.delta_v_mps if impact is not None else None
 
 
 @metric(
@@ -50,7 +52,8 @@ def ego_delta_v_mps(drive: Drive) -> float | None:
     source=_SHELBY,
 )
 def other_delta_v_mps(drive: Drive) -> float | None:
-    return impact_of(drive.game, drive.player).other_delta_v_mps
+    impact = impact_of(drive.game, drive.player)
+    return impact.other.delta_v_mps if impact is not None else None
 
 
 @metric(
@@ -60,7 +63,8 @@ def other_delta_v_mps(drive: Drive) -> float | None:
     "the two surfaces that met, within 45 degrees.",
 )
 def impact_side(drive: Drive) -> str | None:
-    return impact_of(drive.game, drive.player).side
+    impact = impact_of(drive.game, drive.player)
+    return impact.own.side if impact is not None else None
 
 
 # --- how close it came -----------------------------------------------------------------------------------------------
@@ -202,7 +206,7 @@ def _comes_too_close(drive: Drive, criterion: closeness.Criterion) -> bool:
 def severity(drive: Drive) -> float:
     if drive.outcome is Outcome.COLLISION:
         impact = impact_of(drive.game, drive.player)
-        return CONTACT + min(max(impact.own_delta_v_mps or 0.0, impact.other_delta_v_mps or 0.0), _MOST_MPS)
+        return CONTACT + min(impact.delta_v_mps if impact is not None else 0.0, _MOST_MPS)
     if drive.outcome is Outcome.RAIL:
         speeds_mps = drive.of("speed_mps")
         return RAIL + (min(float(speeds_mps[-1]), _MOST_MPS) if len(speeds_mps) else 0.0)
