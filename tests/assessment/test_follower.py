@@ -64,3 +64,5 @@ def test_assess__contact_from_behind_is_a_collision_of_the_ego(merge: OpenScene)
     record = game.record
     assert (record["ego_outcome"], record["impact_side"]) == ("collision", "rear")
     assert record["closing_speed_mps"] > 0.0
+    assert record["bystander_failed"] == 0  # a contact with the ego is the ego's
+    assert 0.0 < record["follower_max_deceleration_mps2"] <= 6.1
