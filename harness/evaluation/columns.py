@@ -86,6 +86,8 @@ def _summary() -> Iterator[Column]:
     yield Column("person_failures", MAYBE, "Games with person_failed: a person fails in a contact without the ego.")
     yield Column("bystander_failures", MAYBE, "Games with bystander_failed: background traffic does.")
     yield from _rate("harm_to_others_rate", "Share of the games with harm_to_others: a person or a bystander does.")
+    meaning = "Mean over the games of the strongest braking of the vehicle that follows the ego; empty without one."
+    yield Column("follower_max_deceleration_mps2", NUMBER, meaning)
     meaning = "Mean over the collisions of the closing speed with the road user that the ego touched."
     yield Column("closing_speed_mps", NUMBER, meaning)
     yield Column("delta_v_mps", NUMBER, f"Mean over the collisions of {_GREATER}")
@@ -94,8 +96,6 @@ def _summary() -> Iterator[Column]:
         meaning = f"Mean of mais3_risk_{end} over the collisions in which it is known: the {bound} bound of the "
         meaning += "probability that a collision injures somebody seriously (MAIS3+)."
         yield Column(f"mais3_risk_{end}", NUMBER, meaning, unit=SHARE)
-    meaning = "Mean over the games of the strongest braking of the vehicle that follows the ego; empty without one."
-    yield Column("follower_max_deceleration_mps2", NUMBER, meaning)
 
 
 _STRATEGIES = (Column("ego", TEXT, "The strategy of the ego."), Column("non_ego", TEXT, "That of the non-ego."))

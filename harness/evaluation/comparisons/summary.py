@@ -37,7 +37,7 @@ def _summary_row(arm: str, persona: str, seed: int, games: pd.DataFrame) -> dict
     outcomes = of_people(played, "outcome")
     took_part = (outcomes != "").to_numpy()
     people = outcomes.to_numpy()[took_part]
-    came_close = played["near_miss"].dropna()
+    near_misses = played["near_miss"].dropna()
     speed_low, speed_high = mean_interval(played["ego_mean_speed_mps"].dropna().to_numpy())
     goal_rate = rate_cells("non_ego_goal_rate", (people == "goal").sum(), len(people))
     if len(people) > took_part.any(axis=1).sum():  # several people in a game
@@ -60,10 +60,10 @@ def _summary_row(arm: str, persona: str, seed: int, games: pd.DataFrame) -> dict
             for name in MEANS
             if "person" in MEANS[name].whose
         },
-        **rate_cells("near_miss_rate", came_close.sum(), len(came_close)),
-        **_severity(played),
-        **_harm(played),
+        **rate_cells("near_miss_rate", near_misses.sum(), len(near_misses)),
         **{f"near_misses_by_{each.name}": played[f"near_miss_{each.name}"].sum(min_count=1) for each in CRITERIA},
+        **_harm(played),
+        **_severity(played),
     }
 
 
