@@ -11,11 +11,15 @@ and 4.3.2: in every row a positive `mean_difference` supports H1:
     RQ2       naive_vs_<persona> -> retrained_vs_<persona>     failure     baseline - treatment (fails less)
     RQ2                                                        mean_speed  treatment - baseline (faster)
 
+For RQ2 there are rows on harm to others, too (`HARM`): treatment - baseline of the games in which a person, or a
+bystander, fails without the ego, and of the follower's strongest braking. Their H1 is the harm.
+
 The same row also contains: the two-sided 95 % t interval of the mean difference; the effect
 size (Cohen's d_z, mean / standard deviation of the differences); for failures McNemar's exact test,
 one-tailed in the direction of H1 like the t-test (of the pairs in which exactly one game failed, is H1 right
 in more than half? Binomial with p = 1/2; 1 when there are no such pairs); and Holm's correction over all
-t-tests of the table, which is that of the whole campaign.
+t-tests of the table, which is that of the whole campaign. Tests of harm are a family of their own: they do not blunt
+the questions, and the questions do not hide harm.
 
 A question whose players were not shown to drive the scene alone, or whose person does not drive as people do
 (`competence.gate_of`), is not answered: its rows have pairs and a mean difference, which describe the games, and no
@@ -36,7 +40,7 @@ import scipy  # loads `scipy.stats` at its first use: workers do without
 from harness.evaluation.columns import TABLES
 from harness.evaluation.competence import Question, ResearchQuestion, Verdict, gate_of
 from harness.evaluation.tables import typed
-from harness.game.arrays import FloatArray
+from harness.game.arrays import BoolArray, FloatArray
 
 CONFIDENCE = 0.95
 """The confidence of every interval in the tables; it does not depend on the campaign's significance."""
@@ -46,8 +50,16 @@ ROUNDING = 1e-12
 METRICS: Mapping[str, tuple[str, Mapping[ResearchQuestion, int]]] = {
     "failure": ("ego_failed", {"RQ1": +1, "RQ2": -1}),
     "mean_speed": ("ego_mean_speed_mps", {"RQ1": -1, "RQ2": +1}),
+    "person_failure": ("person_failed", {"RQ2": +1}),
+    "bystander_failure": ("bystander_failed", {"RQ2": +1}),
+    "follower_braking": ("follower_max_deceleration_mps2", {"RQ2": +1}),
 }
-"""The compared quantities: the column of each, and the sign of `treatment - baseline` under H1."""
+"""The compared quantities: the column of each, and for the questions that compare it the sign of `treatment - baseline`
+under H1."""
+SHARES = frozenset({"failure", "person_failure", "bystander_failure"})
+"""The quantities that are 0 or 1 in a game."""
+HARM = frozenset({"person_failure", "bystander_failure", "follower_braking"})
+"""Harm to others than the ego."""
 
 
 def compare(questions: Iterable[Question], episodes: pd.DataFrame, significance: float) -> pd.DataFrame:
@@ -63,16 +75,28 @@ def compare(questions: Iterable[Question], episodes: pd.DataFrame, significance:
     Raises ValueError when an arm has two games for one episode.
     """
     games = games_by_arm(episodes)
-    rows = [_row(question, metric, games, gate_of(question, games)) for question in questions for metric in METRICS]
+    rows = [
+        _row(question, metric, games, gate_of(question, games))
+        for question in questions
+        for metric, (_, signs) in METRICS.items()
+        if question.question in signs
+    ]
     table = pd.DataFrame(rows, columns=list(TABLES["comparisons"]))
     table["rejects_h0"] = table["p_value"].astype("float64") < significance
-    return typed(with_verdicts(table, significance))
+    return typed(with_verdicts(table, significance, apart=table["metric"].isin(HARM).to_numpy()))
 
 
-def with_verdicts(table: pd.DataFrame, significance: float, difference: str = "mean_difference") -> pd.DataFrame:
+def with_verdicts(
+    table: pd.DataFrame, significance: float, difference: str = "mean_difference", apart: BoolArray | None = None
+) -> pd.DataFrame:
     """A table with Holm's correction over all of its p-values, and the verdict of each row by its pairs, p-values and
-    difference. A row that has a verdict keeps it: that of a closed gate."""
-    table = table.assign(p_holm=holm(table["p_value"].to_numpy(dtype=np.float64)))
+    difference. A row that has a verdict keeps it: that of a closed gate. The rows `apart` [N] are a family of their
+    own."""
+    p_values = table["p_value"].to_numpy(dtype=np.float64)
+    p_holm, apart = np.empty_like(p_values), np.zeros(len(table), dtype=bool) if apart is None else apart
+    for family in (apart, ~apart):
+        p_holm[family] = holm(p_values[family])
+    table = table.assign(p_holm=p_holm)
     verdicts = [
         row["verdict"] or _verdict(row, row[difference], significance).value for row in table.to_dict("records")
     ]
@@ -136,7 +160,7 @@ def _row(
     low, high = low[:, 0], high[:, 0]
     row = vars(question) | closed | {"metric": metric, "pairs": len(low), "pairs_left_out": left_out}
     row |= paired_t_test(low, high, closed)
-    if not closed["reason"] and metric == "failure" and len(low) >= 2:
+    if not closed["reason"] and metric in SHARES and len(low) >= 2:
         row["mcnemar_p"] = mcnemar(high - low, "greater")
     return row
 
