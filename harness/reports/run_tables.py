@@ -73,6 +73,9 @@ class RunTables:
     populations: pd.DataFrame = field(default_factory=_empty("populations"))
     causes: pd.DataFrame = field(default_factory=_empty("causes"))
     realism: pd.DataFrame = field(default_factory=_empty("realism"))
+    attribution: pd.DataFrame = field(default_factory=_empty("attribution"))
+    """Empty: the report has no section on traits."""
+    undecided: pd.DataFrame = field(default_factory=_empty("undecided"))
     reference_drivers: pd.DataFrame = field(default_factory=_empty("reference_drivers"))
     preventability: pd.DataFrame = field(default_factory=_empty("preventability"))
     """Empty: no failure was judged by reference drivers."""
@@ -106,9 +109,11 @@ class RunTables:
 
     @property
     def personas(self) -> list[str]:
-        """Every persona that the manifest or a table names, in order of first appearance."""
-        names = (*self.manifest.get("personas", ()), *self.comparisons["persona"], *self.summary["persona"])
-        return [name for name in dict.fromkeys(names) if name]
+        """Every persona that the manifest or a table names, in order of first appearance; without the baseline, unless
+        it is a persona of the campaign."""
+        own, baseline = self.manifest.get("personas", ()), self.manifest.get("baseline")
+        names = dict.fromkeys((*own, *self.comparisons["persona"], *self.summary["persona"]))
+        return [name for name in names if name and (name != baseline or name in own)]
 
     @cached_property
     def seeds(self) -> list[int]:

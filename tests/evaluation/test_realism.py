@@ -22,7 +22,7 @@ from harness.evaluation.realism import (
     OUTSIDE,
     realism,
 )
-from harness.evaluation.strategies import NAIVE_ALONE, Arm, NaiveEgo, against_persona, persona_alone
+from harness.evaluation.strategies import ATTENTIVE, NAIVE_ALONE, Arm, NaiveEgo, against_persona, persona_alone
 from harness.evaluation.tables import table_of
 
 ARMS = {arm.name: arm for arm in (NAIVE_ALONE, persona_alone("speedy"), against_persona(NaiveEgo(), "speedy"))}
@@ -104,7 +104,7 @@ def test_crashes__are_outside_where_the_interval_is_above_the_rate_of_people() -
 def test_crash_odds__are_those_alone_against_the_same_person_without_lapses() -> None:
     """Of 13 crashes in all, those with lapses have Fisher's noncentral hypergeometric distribution: the estimate makes
     10 their mean, and at the ends of the interval 10 or more, or 10 or fewer, have the probability 0.025."""
-    arms = ARMS | {"speedy_attentive_alone": persona_alone("speedy", attentive=True)}
+    arms = ARMS | {"speedy_attentive_alone": persona_alone("speedy", ATTENTIVE)}
 
     def odds(crashes: int, attentive: int) -> dict[Any, Any]:
         sides = (("speedy_alone", crashes), ("speedy_attentive_alone", attentive))
@@ -127,7 +127,7 @@ def test_crash_odds__are_those_alone_against_the_same_person_without_lapses() ->
 
 
 def test_crash_odds__do_not_mix_the_attentive_games_with_the_person_s_own() -> None:
-    arms = ARMS | {"speedy_attentive_alone": persona_alone("speedy", attentive=True)}
+    arms = ARMS | {"speedy_attentive_alone": persona_alone("speedy", ATTENTIVE)}
     own = games("speedy_alone", "non_ego", lane_change_s=5.0)
     attentive = games("speedy_attentive_alone", "non_ego", lane_change_s=1.0)
     rows = found(own, attentive, arms=arms)

@@ -14,6 +14,7 @@ from harness.config.campaign import Campaign
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.policy_file import write_policy
+from harness.evaluation.strategies import ATTENTIVE
 from harness.road.scene.open_scene import open_scene
 from tests.support.policies import some_policy
 from tests.support.tiny import CAREFUL, PAPER_MERGE, TEXTING
@@ -42,7 +43,7 @@ def test_player__with_its_eyes_on_the_road_has_no_lapses_and_is_else_the_same(
         return member.persona
 
     own = kind(stage="texting-seed1", persona="texting")
-    attentive = kind(stage="texting-seed1", persona="texting", attentive=True)
+    attentive = kind(stage="texting-seed1", persona="texting", borrowed=ATTENTIVE)
     assert drives(own) == persona
     assert persona.attention is not None
     assert drives(attentive) == persona.model_copy(update={"attention": None})
