@@ -18,7 +18,8 @@ _ROUNDING_S = 1e-6  # of times in the tables
 
 def count_undecided(episodes: pd.DataFrame, causes: pd.DataFrame, conduct: pd.DataFrame) -> pd.DataFrame:
     """A row for each arm of an ego against a person and seed, the table `undecided`, from the tables of these names."""
-    people = conduct.loc[conduct["player"] != "ego", [*_GAME, "player", "looks_away_share", "undecided_at_end_s"]]
+    is_person = (conduct["player"] != "ego") & (conduct["persona"] != "")
+    people = conduct.loc[is_person, [*_GAME, "player", "looks_away_share", "undecided_at_end_s"]]
     met = episodes[episodes["ego_failed"].notna()].merge(people[_GAME].drop_duplicates(), on=_GAME)
     failures = causes.merge(people, left_on=[*_GAME, "other"], right_on=[*_GAME, "player"], how="left")
     undecided_s = failures["undecided_at_end_s"] + _ROUNDING_S

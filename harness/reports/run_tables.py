@@ -189,6 +189,10 @@ class RunTables:
         compared = {row["seed"] for row in self.tests_of(question, persona)}
         return [seed for seed in self.seeds if f"{treatment}-seed{seed}" in self.stages or seed in compared]
 
+    def of_own_traits(self, rows: pd.DataFrame) -> pd.DataFrame:
+        """The rows of a table in whose arms people have their own traits."""
+        return rows[~rows["arm"].isin([name for name, arm in self.arms.items() if arm.is_of_a_trait])]
+
     def causes_of(self, question: str, persona: str) -> tuple[str, ...]:
         """Why the ego failed against a persona in the arm that a question is about, a line for each kind of cause."""
         _, treatment = self.arms_of(question, persona)

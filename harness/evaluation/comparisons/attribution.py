@@ -65,10 +65,11 @@ def _row(question: TraitQuestion, games: Mapping[Any, pd.DataFrame]) -> dict[str
 
 def _difference(name: str, caused: FloatArray, *, tested: bool) -> dict[str, float]:
     """The cells of a comparison from the differences [N] of failures in its pairs, with the trait minus without."""
-    cells = mean_cells(f"{name}_difference", caused)
-    if tested and len(caused):
-        return cells | {f"{name}_p": mcnemar(caused, "two-sided")}
-    return dict(list(cells.items())[:1])
+    column = f"{name}_difference"
+    cells = mean_cells(column, caused)
+    if not tested or not len(caused):
+        return {column: cells[column]}
+    return cells | {f"{name}_p": mcnemar(caused, "two-sided")}
 
 
 def _example(question: TraitQuestion, games: Mapping[Any, pd.DataFrame]) -> int | None:
