@@ -19,6 +19,13 @@ from harness.reports.verdict_wording import as_sentence
 
 COUNTS = ("without_pairs", "failures", "failures_without", "alone_pairs", "failures_baseline", "failures_alone")
 
+_UNDECIDED = {
+    "last_second": "in the last second",
+    "since_conflict": "since the conflict began",
+    "all_game": "in the whole game",
+}
+"""When a person decided nothing, by the columns of the table `undecided`."""
+
 
 def attribution_section(tables: RunTables, links: GameLinks) -> list[dict[str, Any]]:
     """What the template shows for each persona: `lines`, each with its text and the address of a pair of games to watch
@@ -83,13 +90,14 @@ def _undecided(persona: str, tables: RunTables) -> str:
     """In how many failures of the naive ego a persona decided nothing; empty where there are none."""
     arm = against_persona(NaiveEgo(), persona).name
     counts = tables.undecided[tables.undecided["arm"] == arm].sum(numeric_only=True)
-    since, last, always = (int(counts[f"undecided_{when}"]) for when in ("since_conflict", "last_second", "all_game"))
-    if not since and not last:
+    found = [(int(counts[f"undecided_{when}"]), words) for when, words in _UNDECIDED.items()]
+    found = [(count, words) for count, words in found if count]
+    if not found:
         return ""
-    return (
-        f"In {since} of the {int(counts['failures'])} failures {persona} decided nothing since the conflict began, in "
-        f"{last} nothing in the last second, in {always} nothing in the whole game: its attention had lapsed."
-    )
+    (first, when), *others = found
+    rest = "".join(f", in {count} {words}" for count, words in others)
+    failures = int(counts["failures"])
+    return f"In {first} of {failures} failures {persona} decided nothing {when}{rest}: its attention had lapsed."
 
 
 def _pair_address(rows: pd.DataFrame, links: GameLinks) -> str:

@@ -12,18 +12,9 @@ from harness.reports.attribution_section import attribution_section
 from harness.reports.game_links import GameLinks
 from harness.reports.numbers import NO_SPACE
 from harness.reports.run_tables import RunTables
-from tests.support.game_tables import arm, table
+from tests.support.game_tables import OWN, WITHOUT, arm, table, trait_row
 
-OWN, WITHOUT = "naive_vs_speedy", "naive_vs_speedy_with_shoulder_glance_of_careful"
 MANIFEST = {"personas": ["speedy"], "baseline": "careful", "campaign": {"assessment": {"significance": 0.01}}}
-
-
-def row(trait: str, with_it: int, without: int, p: float = 1e-6, seed: int = 1, **changes: Any) -> dict[str, Any]:
-    counts = {"without_pairs": 100, "failures": with_it, "failures_without": without}
-    counts |= {"without_pairs_left_out": 0, "alone_pairs": 100, "failures_baseline": 2, "failures_alone": 9}
-    cells = {"without_difference": (with_it - without) / 100, "alone_difference": 0.07, "without_p_holm": p}
-    arms = {"arm": OWN, "without_arm": WITHOUT, "baseline_arm": "naive_vs_careful", "alone_arm": "x"}
-    return {"persona": "speedy", "seed": seed, "trait": trait, **arms, **counts, **cells, **changes}
 
 
 def section(
@@ -45,7 +36,7 @@ def texts(*rows: dict[str, Any], **options: Any) -> list[str]:
 
 
 def test_sentence__names_the_trait_with_the_most_failures() -> None:
-    found = texts(row("all", 26, 2), row("payoff", 26, 20), row("shoulder_glance", 26, 3))
+    found = texts(trait_row("all", 26, 2), trait_row("payoff", 26, 20), trait_row("shoulder_glance", 26, 3))
     assert found == [
         "With the shoulder glances of careful, speedy makes the naive ego fail in 3 of 100 games instead of 26. "
         "With the shoulder glances of speedy, careful makes it fail in 9 of 100 instead of 2."
@@ -53,51 +44,51 @@ def test_sentence__names_the_trait_with_the_most_failures() -> None:
 
 
 def test_sentence__says_what_can_be_chance_and_what_several_trainings_say() -> None:
-    (one,) = texts(row("payoff", 26, 20, p=0.2))
+    (one,) = texts(trait_row("payoff", 26, 20, p=0.2))
     assert "instead of 26. The difference can be chance. With" in one
-    (two,) = texts(row("payoff", 26, 20, p=0.2), row("payoff", 30, 1, seed=2))
+    (two,) = texts(trait_row("payoff", 26, 20, p=0.2), trait_row("payoff", 30, 1, seed=2))
     assert (
         "fail in 21 of 200 games of 2 trainings instead of 56. The difference is significant in 1 of 2 trainings" in two
     )
 
 
 def test_sentence__without_failures_or_without_a_trait_that_causes_any() -> None:
-    assert texts(row("payoff", 0, 0)) == [
+    assert texts(trait_row("payoff", 0, 0)) == [
         "Against speedy the naive ego fails in none of 100 games: no trait causes failures."
     ]
-    assert texts(row("payoff", 5, 7)) == [
+    assert texts(trait_row("payoff", 5, 7)) == [
         "No trait by itself: the naive ego fails in 5 of 100 games against speedy, and in no fewer with any one trait "
         "of careful instead."
     ]
 
 
 def test_sentence__of_players_that_can_not_drive_is_the_reason() -> None:
-    assert texts(row("payoff", 26, 20, reason="the careful driver can't drive this scene")) == [
+    assert texts(trait_row("payoff", 26, 20, reason="the careful driver can't drive this scene")) == [
         "Not answered: The careful driver can't drive this scene."
     ]
 
 
 def test_undecided__is_a_sentence_where_there_are_such_failures() -> None:
     counts = {"failures": 26, "undecided_all_game": 1, "undecided_since_conflict": 12, "undecided_last_second": 9}
-    _, found = texts(row("payoff", 26, 3), undecided=[{"arm": OWN, "persona": "speedy", "seed": 1, **counts}])
+    _, found = texts(trait_row("payoff", 26, 3), undecided=[{"arm": OWN, "persona": "speedy", "seed": 1, **counts}])
     assert found == (
-        "In 12 of the 26 failures speedy decided nothing since the conflict began, in 9 nothing in the last second, in "
-        "1 nothing in the whole game: its attention had lapsed."
+        "In 9 of 26 failures speedy decided nothing in the last second, in 12 since the conflict began, in 1 in the "
+        "whole game: its attention had lapsed."
     )
 
 
 def test_game__is_that_with_the_trait_beside_that_without() -> None:
     keys = [f"{OWN},1,4", f"{WITHOUT},1,4"]
-    (line,) = section(row("payoff", 26, 3, example=4), embedded=keys)["lines"]
+    (line,) = section(trait_row("payoff", 26, 3, example=4), embedded=keys)["lines"]
     assert line["game"] == f"#game={keys[0]}&with={keys[1]}"
-    (line,) = section(row("payoff", 26, 3, example=4), embedded=keys[:1])["lines"]
+    (line,) = section(trait_row("payoff", 26, 3, example=4), embedded=keys[:1])["lines"]
     assert line["game"] == f"#game={keys[0]}"
-    (line,) = section(row("payoff", 26, 3, example=4))["lines"]
+    (line,) = section(trait_row("payoff", 26, 3, example=4))["lines"]
     assert line["game"] == ""
 
 
 def test_rows__have_counts_differences_and_p() -> None:
-    (cells,) = section(row("attention", 26, 3, without_difference_low=0.1, without_difference_high=0.36))["rows"]
+    (cells,) = section(trait_row("attention", 26, 3, without_difference_low=0.1, without_difference_high=0.36))["rows"]
     assert cells["trait"] == "attention"
     assert cells["cells"] == [
         *(
