@@ -122,7 +122,7 @@ def _check_campaign(file: Path, allow_code: bool, as_json: bool, console: Consol
     ego = [] if opened.document.ego.driver == LEARNED else [messages.ego(opened), *notes]
     told = (*varying.items(), *opened.learned_elsewhere.items())
     ego = [plain(each) for each in (*ego, *(f"{driver}: {words}" for driver, words in told))]
-    unsuited = persona_remarks(opened.personas, opened.scene.world, opened.document.training.discount)
+    unsuited = persona_remarks([*opened.people.values()], opened.scene.world, opened.document.training.discount)
     remarks = [*opened.scene.warnings, *unsuited, *ego_persona_remarks(opened.ego_persona), *ego]
     print_plain([f"{file} is in order.", *remarks], console)
     print_plain([messages.work(opened, stages), *messages.stage_lines(stages)], console)

@@ -106,6 +106,17 @@ class Assessment(Document):
     """Whether each failure of an ego against a persona is judged: would a reference driver have prevented it?"""
 
 
+class Attribution(Document):
+    """Attribution of failures: which trait of a persona makes the naive ego fail, and how often. The games of
+    `naive_vs_<persona>` are played again with one trait exchanged, for each trait in which the persona differs from the
+    baseline: by the persona without the trait, and by the baseline with this trait alone."""
+
+    baseline: DocumentPath
+    """A careful person: its file, relative to this file, or the name of a shipped persona. It drives in the non-ego's
+    place with the human limits of its document, and is trained as a persona of round 1, once for each seed. It may be a
+    persona of the campaign."""
+
+
 class Competence(Document):
     """What a player has to achieve without the other player before its results count. A question about players of which
     one achieves less is not answered, and a training that made such a player is reported as `did not learn`."""
@@ -183,6 +194,7 @@ class Campaign(Document):
     rounds: Rounds = Rounds()
     best_response: BestResponseSearch | None = None
     crossplay: CrossPlay | None = None
+    attribution: Attribution | None = None
     competence: Competence = Competence()
     assessment: Assessment = Assessment()
     acceptance: Acceptance | None = None

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
+from harness.evaluation.attribution_columns import ATTRIBUTION, UNDECIDED
 from harness.evaluation.column import COUNT, FLAG, MAYBE, NUMBER, OF_METRIC, P_VALUE, POINTS, SHARE, TEXT, Column
 from harness.evaluation.measured_game import METRICS_OF_CONDUCT, METRICS_OF_GAMES, METRICS_OF_PLAYERS
 
@@ -171,6 +172,8 @@ _TABLES = {
         Column("rejects_h0", FLAG, "Whether p_value is below the significance.", label="rejects H0 (p alone)"),
         *(_VERDICT, _REASON),
     ),
+    "attribution": (PERSONA, SEED, *ATTRIBUTION, _REASON),
+    "undecided": (ARM, PERSONA, SEED, *UNDECIDED),
     "training": (
         Column("stage", TEXT, "The name of the training."),
         *(PERSONA, SEED),

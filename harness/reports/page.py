@@ -11,6 +11,7 @@ from harness.reports import human_ranges
 from harness.reports.acceptance_wording import acceptance_lines, headline
 from harness.reports.arm_figures import MOST_DOTS
 from harness.reports.arm_glossary import glossary
+from harness.reports.attribution_section import attribution_section
 from harness.reports.cards import CAUTION, card
 from harness.reports.data_table import table
 from harness.reports.differences import effect
@@ -51,13 +52,14 @@ def render_page(tables: RunTables, games: Iterable[GameTracks] = (), scene: Mapp
     texts = embedded_games(games if scene is not None else (), marks_of(tables.manoeuvres), tables.crowds, GAMES_BYTES)
     links = GameLinks(embedded=texts, episodes=tables.episodes)
     environment = environment_of("reports")
-    arms, pairs = failures_by_cause(tables.causes, texts)
+    arms, pairs = failures_by_cause(tables.of_own_traits(tables.causes), texts)
     steps = next_steps(tables)
     page = environment.get_template("report.html.jinja").render(
         **_header(tables),
         **_troubles(tables),
         acceptance=_acceptance(tables),
         answers=first_answers(tables, steps),
+        attribution=attribution_section(tables, links),
         next_steps=steps,
         cards=[card(persona, place, tables, links) for place, persona in enumerate(tables.personas, 1)],
         most_dots=MOST_DOTS if tables.episodes.groupby("arm").size().max() > MOST_DOTS else 0,

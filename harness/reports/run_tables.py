@@ -73,6 +73,9 @@ class RunTables:
     populations: pd.DataFrame = field(default_factory=_empty("populations"))
     causes: pd.DataFrame = field(default_factory=_empty("causes"))
     realism: pd.DataFrame = field(default_factory=_empty("realism"))
+    attribution: pd.DataFrame = field(default_factory=_empty("attribution"))
+    """Empty: the report has no section on traits."""
+    undecided: pd.DataFrame = field(default_factory=_empty("undecided"))
     reference_drivers: pd.DataFrame = field(default_factory=_empty("reference_drivers"))
     preventability: pd.DataFrame = field(default_factory=_empty("preventability"))
     """Empty: no failure was judged by reference drivers."""
@@ -106,9 +109,11 @@ class RunTables:
 
     @property
     def personas(self) -> list[str]:
-        """Every persona that the manifest or a table names, in order of first appearance."""
-        names = (*self.manifest.get("personas", ()), *self.comparisons["persona"], *self.summary["persona"])
-        return [name for name in dict.fromkeys(names) if name]
+        """Every persona that the manifest or a table names, in order of first appearance; without the baseline, unless
+        it is a persona of the campaign."""
+        own, baseline = self.manifest.get("personas", ()), self.manifest.get("baseline")
+        names = dict.fromkeys((*own, *self.comparisons["persona"], *self.summary["persona"]))
+        return [name for name in names if name and (name != baseline or name in own)]
 
     @cached_property
     def seeds(self) -> list[int]:
@@ -183,6 +188,10 @@ class RunTables:
         _, treatment = self.arms_of(question, persona)
         compared = {row["seed"] for row in self.tests_of(question, persona)}
         return [seed for seed in self.seeds if f"{treatment}-seed{seed}" in self.stages or seed in compared]
+
+    def of_own_traits(self, rows: pd.DataFrame) -> pd.DataFrame:
+        """The rows of a table in whose arms people have their own traits."""
+        return rows[~rows["arm"].isin([name for name, arm in self.arms.items() if arm.is_of_a_trait])]
 
     def causes_of(self, question: str, persona: str) -> tuple[str, ...]:
         """Why the ego failed against a persona in the arm that a question is about, a line for each kind of cause."""

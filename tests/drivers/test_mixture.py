@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from harness.assessment.rollout import SeatedArm, assess
-from harness.campaign.results.evaluate_run import by_who_drove
+from harness.campaign.results.who_drove import by_who_drove
 from harness.config.campaign import Campaign, Population
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document

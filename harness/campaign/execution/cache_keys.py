@@ -16,6 +16,7 @@ from harness.campaign.plan.stages import (
     SearchStage,
     Stage,
     TrainingStage,
+    borrowed_of,
     members_of,
     persona_of,
 )
@@ -43,10 +44,11 @@ def stage_keys(campaign: OpenCampaign, stages: Sequence[Stage]) -> dict[str, str
 def _inputs(campaign: OpenCampaign, stage: Stage) -> dict[str, Any]:
     """What one stage's numbers depend on, beside the scene and other stages."""
     document = campaign.document
-    personas = {"": campaign.ego_persona, **{each.name: each for each in campaign.personas}}
+    personas = {"": campaign.ego_persona, **campaign.people}
     own = [stage.persona] if stage.persona in personas else []
     players = members_of(*(stage.opponent if isinstance(stage, TrainingStage | SearchStage) else stage.drivers))
-    names = dict.fromkeys(["", *own, *map(persona_of, players)])
+    givers = [borrowed.of for each in players if (borrowed := borrowed_of(each)) is not None]
+    names = dict.fromkeys(["", *own, *map(persona_of, players), *givers])
     people = [personas[name].model_dump(mode="json", exclude={"unlike_people"}) for name in names]  # it changes no game
     inputs: dict[str, Any] = {"stage": repr(stage), "personas": people}
     match stage:

@@ -19,7 +19,6 @@ from harness.campaign.plan.stages import (
     Trained,
     TrainedBefore,
     driver_in,
-    persona_of,
 )
 from harness.campaign.storage.manifest import planned
 from harness.campaign.storage.run_folder import MANIFEST, RunFolder
@@ -100,7 +99,8 @@ class RunPlayers:
     def people(self, stage: AssessmentStage, episode: int) -> tuple[SeatedDriver, ...]:
         """Each person of an arm in one episode. Raises UsageError if a policy can't be read."""
         members = (_member(stage, player, episode) for player in range(1, len(self.scene.world.roles)))
-        return tuple(self._seated(each, self._context.persona(persona_of(each))) for each in members)
+        players = PlayerFactory(context=self._context, scene=self.scene)
+        return tuple(self._seated(each, players.persona(each)) for each in members)
 
     def _seated(self, planned: PlannedMember, persona: Persona) -> SeatedDriver:
         players = PlayerFactory(context=self._context, scene=self.scene)

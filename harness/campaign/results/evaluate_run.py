@@ -12,25 +12,20 @@ from harness.campaign.plan.stages import AssessmentStage, TrainingStage, stage_i
 from harness.campaign.results.matchups import matchups_of
 from harness.campaign.results.read_run import ReadRun
 from harness.campaign.results.realism_gate import declared_of, questions_of
+from harness.campaign.results.run_traits import failures_by_trait
+from harness.campaign.results.who_drove import by_who_drove
 from harness.campaign.storage.learned import judged
 from harness.campaign.storage.manifest import is_tuned
-from harness.config.campaign import Campaign
-from harness.evaluation.columns import TABLES
 from harness.evaluation.comparisons.acceptance_checks import Evidence, judge
 from harness.evaluation.comparisons.comparison import compare, games_by_arm
 from harness.evaluation.comparisons.preventability import count_prevented
 from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.competence import Goals, goals_alone
 from harness.evaluation.game_theory.findings import GameFindings, find
-from harness.evaluation.people import people_in
 from harness.evaluation.realism import OF_DRIVERS, OF_RIDERS, OF_WALKERS, HumanFigure, realism
-from harness.evaluation.strategies import Arm, NaiveEgo, ReconfiguredEgo, RetrainedEgo, against_persona
-from harness.evaluation.tables import joined, table_of
-from harness.game.initial_state import member_in_episode
-from harness.game.roles import NON_EGO
+from harness.evaluation.strategies import Arm
+from harness.evaluation.tables import table_of
 from harness.reports.run_tables import RunTables
-
-_SUMMARY_COLUMNS = [name for name in TABLES["populations"] if name not in ("arm", "population", "seed", "persona")]
 
 
 def evaluated(run: ReadRun) -> RunTables:
@@ -57,6 +52,7 @@ def evaluated(run: ReadRun) -> RunTables:
         game=_game(run),
         non_ego_drives=_people_drive(run),
         populations=by_who_drove(run.campaign, run.episodes),
+        **failures_by_trait(run),
         **prevented,
     )
     asked = run.campaign.acceptance
@@ -76,7 +72,8 @@ def evaluated(run: ReadRun) -> RunTables:
 
 def csv_tables(run: ReadRun, tables: RunTables) -> dict[str, pd.DataFrame]:
     """The tables that the run folder gets, by the names of their files."""
-    names = ["episodes", "training", "summary", "comparisons", "causes", "manoeuvres", "realism"]
+    names = ["episodes", "training", "summary", "comparisons", "causes", "manoeuvres", "realism", "undecided"]
+    names += ["attribution"] if run.campaign.attribution is not None else []
     names += ["reference_drivers", "preventability"] if run.reference_drivers is not None else []
     names += ["populations"] if run.campaign.population else []
     names += ["reconfiguration"] if is_tuned(run.manifest) else []
@@ -119,25 +116,3 @@ def _game(run: ReadRun) -> GameFindings | None:
         return None
     significance = run.campaign.assessment.significance
     return find(game.pairings, game.responses, game.training_personas, run.episodes, significance)
-
-
-def by_who_drove(campaign: Campaign, episodes: pd.DataFrame) -> pd.DataFrame:
-    """A row for each arm against a population, seed and persona that drove in it, the table `populations`. With several
-    people, the personas in their places.
-
-    The draw is repeated here: it depends on the place, the arm's seed and the episode only.
-    """
-    frames = []
-    for population in campaign.population:
-        name, names, shares = population.name, list(population.shares), list(population.shares.values())
-        egos = (NaiveEgo(), RetrainedEgo(against=name), ReconfiguredEgo(against=name))
-        for arm in [against_persona(ego, name).name for ego in egos]:
-            games = episodes[episodes["arm"] == arm]
-            players = range(NON_EGO, NON_EGO + len(people_in(games.columns)))
-            drivers = [
-                ", ".join(names[member_in_episode(shares, player, int(seed), int(episode))] for player in players)
-                for seed, episode in zip(games["seed"], games["episode"], strict=True)
-            ]
-            rows = summarise(games.assign(persona=drivers)).sort_values(["seed", "persona"], kind="stable")
-            frames.append(rows[["arm", "seed", "persona", *_SUMMARY_COLUMNS]].assign(population=name))
-    return joined("populations", frames)
