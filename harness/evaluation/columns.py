@@ -14,7 +14,7 @@ _PAPER = "the paper, section 4.2"
 ARM = Column("arm", TEXT, "The name of the arm, such as naive_vs_speedy.")
 PERSONA = Column("persona", TEXT, "The persona of the non-ego; of an arm with one.")
 SEED = Column("seed", COUNT, "The training seed.")
-EPISODE = Column("episode", COUNT, "The game. Equal numbers begin alike in every arm.")
+EPISODE = Column("episode", COUNT, "The game. Equal numbers begin alike in every arm and for every training seed.")
 _GAME = (ARM, PERSONA, SEED, EPISODE)
 _EGO_FAILED = Column("ego_failed", MAYBE, "1 if the ego did not reach its goal, else 0.", source="the paper, section 4")
 _ERROR = Column("error", TEXT, "Why the game could not be played; empty if it was.")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import pandas as pd
@@ -119,7 +120,7 @@ def by_who_drove(campaign: Campaign, episodes: pd.DataFrame) -> pd.DataFrame:
     """A row for each arm against a population, seed and persona that drove in it, the table `populations`. With several
     people, the personas in their places.
 
-    The draw is repeated here: it depends on the place, the arm's seed and the episode only.
+    The draw is repeated here: it depends on the place, the seed of the starts and the episode only.
     """
     frames = []
     for population in campaign.population:
@@ -128,9 +129,10 @@ def by_who_drove(campaign: Campaign, episodes: pd.DataFrame) -> pd.DataFrame:
         for arm in [against_persona(ego, name).name for ego in egos]:
             games = episodes[episodes["arm"] == arm]
             players = range(NON_EGO, NON_EGO + len(people_in(games.columns)))
+            draw = partial(member_in_episode, shares, seed=campaign.start_seed)
             drivers = [
-                ", ".join(names[member_in_episode(shares, player, int(seed), int(episode))] for player in players)
-                for seed, episode in zip(games["seed"], games["episode"], strict=True)
+                ", ".join(names[draw(player=player, episode=int(episode))] for player in players)
+                for episode in games["episode"]
             ]
             rows = summarise(games.assign(persona=drivers)).sort_values(["seed", "persona"], kind="stable")
             frames.append(rows[["arm", "seed", "persona", *_SUMMARY_COLUMNS]].assign(population=name))
