@@ -110,10 +110,12 @@ def check(
 
 def _check_campaign(file: Path, allow_code: bool, as_json: bool, console: Console) -> None:
     from harness.campaign.execution.repeat_check import varying_drivers
+    from harness.campaign.plan.paper_rounds import questions
     from harness.campaign.plan.persona_remarks import persona_remarks
     from harness.campaign.preflight import open_campaign
     from harness.config.campaign import LEARNED
     from harness.errors import plain
+    from harness.evaluation.planned_tests import families
 
     opened = open_campaign(file, allow_code=allow_code)
     varying = varying_drivers(opened)
@@ -125,10 +127,14 @@ def _check_campaign(file: Path, allow_code: bool, as_json: bool, console: Consol
     unsuited = persona_remarks(opened.personas, opened.scene.world, opened.document.training.discount)
     remarks = [*opened.scene.warnings, *unsuited, *ego]
     print_plain([f"{file} is in order.", *remarks], console)
+    personas = [each.name for each in opened.personas]
+    planned = families(questions(opened.document, personas, opened.tunable))
     print_plain([messages.work(opened, stages), *messages.stage_lines(stages)], console)
+    print_plain(messages.family_lines(planned), console)
     if as_json:
         checked = {"campaign": opened.document.name, "file": str(file), "in_order": True}
-        print_json({**checked, "remarks": remarks, "stages": messages.stage_records(stages)})
+        listed = {"stages": messages.stage_records(stages), "planned_tests": messages.family_records(planned)}
+        print_json({**checked, "remarks": remarks, **listed})
 
 
 def schema(
