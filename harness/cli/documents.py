@@ -110,12 +110,11 @@ def check(
 
 def _check_campaign(file: Path, allow_code: bool, as_json: bool, console: Console) -> None:
     from harness.campaign.execution.repeat_check import varying_drivers
-    from harness.campaign.plan.paper_rounds import questions
     from harness.campaign.plan.persona_remarks import persona_remarks
+    from harness.campaign.plan.planned_families import family_lines, family_records, planned_families
     from harness.campaign.preflight import open_campaign
     from harness.config.campaign import LEARNED
     from harness.errors import plain
-    from harness.evaluation.planned_tests import families
 
     opened = open_campaign(file, allow_code=allow_code)
     varying = varying_drivers(opened)
@@ -128,12 +127,12 @@ def _check_campaign(file: Path, allow_code: bool, as_json: bool, console: Consol
     remarks = [*opened.scene.warnings, *unsuited, *ego]
     print_plain([f"{file} is in order.", *remarks], console)
     personas = [each.name for each in opened.personas]
-    planned = families(questions(opened.document, personas, opened.tunable))
+    planned = planned_families(opened.document, personas, opened.tunable)
     print_plain([messages.work(opened, stages), *messages.stage_lines(stages)], console)
-    print_plain(messages.family_lines(planned), console)
+    print_plain(family_lines(planned), console)
     if as_json:
         checked = {"campaign": opened.document.name, "file": str(file), "in_order": True}
-        listed = {"stages": messages.stage_records(stages), "planned_tests": messages.family_records(planned)}
+        listed = {"stages": messages.stage_records(stages), "planned_tests": family_records(planned)}
         print_json({**checked, "remarks": remarks, **listed})
 
 

@@ -11,7 +11,6 @@ from rich.markup import escape
 if TYPE_CHECKING:
     from harness.campaign.plan.stages import Stage
     from harness.campaign.preflight import OpenCampaign
-    from harness.evaluation.planned_tests import Family
     from harness.road.scene.open_scene import OpenScene
 
 NOTHING_TO_SHORTEN = "Nothing to shorten: the players are already trained. All games are played."
@@ -74,30 +73,6 @@ def work(campaign: OpenCampaign, stages: Sequence[Stage]) -> str:
         budget = f"of up to {document.best_response.steps:,} steps"
         parts.append(f"{_counted(responses, 'training')} of best responses {budget}")
     return ", ".join([*parts, f"{_counted(arms, 'arm')} of {_counted(document.assessment.episodes, 'episode')}:"])
-
-
-def family_lines(families: Sequence[Family]) -> Iterator[str]:
-    """A line for each family of Holm's correction: its tests, and their training seeds."""
-    for family in families:
-        tests = ", ".join(dict.fromkeys(f"{test.question} {test.persona}" for test in family.tests))
-        seeds = list(dict.fromkeys(str(seed) for test in family.tests for seed in test.seeds))
-        each = "each by itself" if len(family.tests[0].seeds) == 1 else "together"
-        trainings = f"training seeds {', '.join(seeds)} {each}" if len(seeds) > 1 else f"training seed {seeds[0]}"
-        size = _counted(len(family.tests), "test")
-        yield f"Holm's correction over {size} about {family.about.value}: {tests} ({trainings})"
-
-
-def family_records(families: Sequence[Family]) -> list[dict[str, object]]:
-    """A record for each family, as `family_lines` tells it."""
-    return [
-        {
-            "about": family.about.value,
-            "tests": [
-                {"question": test.question, "persona": test.persona, "seeds": list(test.seeds)} for test in family.tests
-            ],
-        }
-        for family in families
-    ]
 
 
 def _counted(number: int, noun: str) -> str:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from harness.campaign.plan.paper_rounds import questions
-from harness.evaluation.planned_tests import About, families
+from harness.campaign.plan.planned_families import planned_families
+from harness.evaluation.planned_tests import About
 from tests.support.plans import campaign_of
 
 
@@ -14,7 +14,7 @@ from tests.support.plans import campaign_of
 )
 def test_families__are_those_of_the_plan(seeds: list[int], of_pairs: int, over: int) -> None:
     personas = ["anna", "bert", "carl"]
-    found = families(questions(campaign_of(*personas, seeds=seeds), personas))
+    found = planned_families(campaign_of(*personas, seeds=seeds), personas)
     sizes = {About.TRAINED_PAIR: of_pairs, About.TRAININGS: over}
     assert {each.about: len(each.tests) for each in found} == {about: size for about, size in sizes.items() if size}
     for family in found:
@@ -27,6 +27,6 @@ def test_families__are_those_of_the_plan(seeds: list[int], of_pairs: int, over: 
 
 def test_families__of_an_ego_that_does_not_learn_have_its_only_question() -> None:
     campaign = campaign_of("anna", seeds=[1, 2, 3], ego={"driver": "sumo"})
-    pairs, over = families(questions(campaign, ["anna"]))
+    pairs, over = planned_families(campaign, ["anna"])
     assert [(each.question, each.persona, each.seeds) for each in over.tests] == [("RQ1", "anna", (1, 2, 3))]
     assert len(pairs.tests) == 3
