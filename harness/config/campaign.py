@@ -177,7 +177,8 @@ class Campaign(Document):
     """Files of the personas that the ego meets, one after the other, relative to this file, or names of shipped
     personas."""
     seeds: list[Seed] = Field([1], min_length=1, max_length=100)
-    """Training seeds. All players are trained and assessed once per seed."""
+    """Training seeds. All players are trained once per seed. All trainings are assessed in the same games: their starts
+    are drawn from the first seed."""
     policies: DocumentPath | None = None
     """Folder of trained policies, with the layout of `policies/` in a run folder. Nothing is trained; every learned
     player is read from this folder."""
@@ -249,6 +250,12 @@ class Campaign(Document):
         the first again."""
         populations = {each.name: (each.shares,) for each in self.population}
         return populations | {each.name: tuple({name: 1.0} for name in each.personas) for each in self.crowd}
+
+    @property
+    def start_seed(self) -> int:
+        """The seed of the assessment's starts, the same for all trainings: a seed that is added at the end of `seeds`
+        changes no game of the others."""
+        return self.seeds[0]
 
     @property
     def stops_early(self) -> bool:

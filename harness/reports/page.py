@@ -24,6 +24,7 @@ from harness.reports.next_steps import first_answers, next_steps
 from harness.reports.page_template import CONTENT_POLICY, ELSEWHERE, LIBRARIES, SCRIPTS, environment_of, sources
 from harness.reports.provenance import asked_alone, command_of, facts, made_by, mixed_versions
 from harness.reports.run_tables import RunTables, unplayed
+from harness.reports.scope_wording import planned_in_words
 
 MOST_ROWS = 10_000
 """The page leaves out a longer table of games and refers to its CSV file."""
@@ -31,7 +32,8 @@ GAMES_BYTES = 600_000
 """Room for recorded games. `harness serve` shows all."""
 QUICK = "Quick run: fewer training steps than table 1; not for conclusions."
 CAPTIONS = {
-    "comparisons": "Every test of the campaign.",
+    "comparisons": "Every test of a trained pair.",
+    "over_trainings": "Every test over trainings.",
     "summary": "A row per arm and training seed.",
     "training": "A row per window of a learning curve.",
     "episodes": "A row per game.",
@@ -66,7 +68,7 @@ def render_page(tables: RunTables, games: Iterable[GameTracks] = (), scene: Mapp
         caution=CAUTION,
         metrics=METRICS,
         effect=effect,
-        tests=int(tables.comparisons["p_value"].notna().sum()),
+        planned=planned_in_words(tables),
         embedded=texts,
         left=len(tables.played) - len(texts),
         recorded=recorded_document(scene, texts.values()),

@@ -67,6 +67,8 @@ class RunTables:
     episodes: pd.DataFrame = field(default_factory=_empty("episodes"))
     summary: pd.DataFrame = field(default_factory=_empty("summary"))
     comparisons: pd.DataFrame = field(default_factory=_empty("comparisons"))
+    over_trainings: pd.DataFrame = field(default_factory=_empty("over_trainings"))
+    """Empty: the campaign has too few training seeds."""
     training: pd.DataFrame = field(default_factory=_empty("training"))
     reconfiguration: pd.DataFrame = field(default_factory=_empty("reconfiguration"))
     """Empty: the report has no section on searches."""
@@ -182,6 +184,12 @@ class RunTables:
         """The rows of `comparisons` on a question about a persona."""
         rows = self.comparisons
         return rows[(rows["question"] == question) & (rows["persona"] == persona)].to_dict("records")
+
+    def over_trainings_of(self, question: str, persona: str) -> Row | None:
+        """The row of `over_trainings` on a question about a persona; None: the campaign has too few training seeds."""
+        rows = self.over_trainings
+        found = rows[(rows["question"] == question) & (rows["persona"] == persona)].to_dict("records")
+        return found[0] if found else None
 
     def asked(self, question: str, persona: str) -> list[int]:
         """The training seeds of which a question is asked: its treatment is planned, or it is compared."""

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from harness.campaign.plan.stages import (
+    AssessmentStage,
     BestOf,
     External,
     PreventabilityStage,
@@ -62,6 +63,8 @@ def _inputs(campaign: OpenCampaign, stage: Stage) -> dict[str, Any]:
             inputs["references"] = reference_identity()
         case _:
             inputs["episodes"] = document.assessment.episodes
+    if isinstance(stage, AssessmentStage | PreventabilityStage) and stage.seed != document.start_seed:
+        inputs["start_seed"] = document.start_seed  # that of the first training seed is in the stage
     if campaign.policies is not None and stage.reads:
         others = campaign.policy_drivers
         read = {name: policy_files(campaign.policies / name) for name in stage.reads if name not in others}

@@ -59,7 +59,7 @@ class PlayerFactory:
     def arm(self, stage: AssessmentStage) -> SeatedArm:
         """The arm of an assessment. A `BestOf` in it has to be `chosen` first."""
         drivers = (self.player(driver_in(stage.ego, 0)), *self.people(stage.non_ego))
-        return SeatedArm(name=stage.name, scene=self.scene, drivers=drivers, seed=stage.seed)
+        return SeatedArm(name=stage.name, scene=self.scene, drivers=drivers, seed=self.context.document.start_seed)
 
     def people(self, side: Side) -> tuple[Mixture | None, ...]:
         """The drivers in each place of the non-egos, each made anew."""

@@ -10,14 +10,15 @@ import pandas as pd
 
 from harness.campaign.plan.stages import AssessmentStage, TrainingStage, stage_id
 from harness.campaign.results.matchups import matchups_of
+from harness.campaign.results.population_rows import by_who_drove
 from harness.campaign.results.read_run import ReadRun
-from harness.campaign.results.realism_gate import declared_of, questions_of
+from harness.campaign.results.realism_gate import declared_of, is_played, questions_of
 from harness.campaign.results.run_traits import failures_by_trait
-from harness.campaign.results.who_drove import by_who_drove
 from harness.campaign.storage.learned import judged
 from harness.campaign.storage.manifest import is_tuned
 from harness.evaluation.comparisons.acceptance_checks import Evidence, judge
 from harness.evaluation.comparisons.comparison import compare, games_by_arm
+from harness.evaluation.comparisons.over_trainings import compare_over_trainings
 from harness.evaluation.comparisons.preventability import count_prevented
 from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.competence import Goals, goals_alone
@@ -37,13 +38,16 @@ def evaluated(run: ReadRun) -> RunTables:
         counts = count_prevented(run.reference_drivers, run.episodes)
         prevented = {"reference_drivers": run.reference_drivers, "preventability": counts}
     found = realism(run.conduct, _arms(run), declared_of(run), _figures_of_people(run))
+    asked, significance = questions_of(run, found), run.campaign.assessment.significance
+    played = [each for each in asked if is_played(each, run)]
     tables = RunTables(
         manifest=manifest,
         arms=_arms(run),
         strategies={stage.name: stage.strategy for stage in run.stages if isinstance(stage, TrainingStage)},
         episodes=run.episodes,
         summary=summarise(run.episodes),
-        comparisons=compare(questions_of(run, found), run.episodes, run.campaign.assessment.significance),
+        comparisons=compare(played, run.episodes, significance, planned=len(asked)),
+        over_trainings=compare_over_trainings(asked, run.episodes, significance),
         training=_with_ends(run.training, entries),
         reconfiguration=run.reconfiguration,
         manoeuvres=run.manoeuvres,
@@ -55,8 +59,8 @@ def evaluated(run: ReadRun) -> RunTables:
         **failures_by_trait(run),
         **prevented,
     )
-    asked = run.campaign.acceptance
-    if asked is None:
+    acceptance = run.campaign.acceptance
+    if acceptance is None:
         return tables
     evidence = Evidence(
         arms=tables.arms,
@@ -67,7 +71,7 @@ def evaluated(run: ReadRun) -> RunTables:
         preventability=tables.preventability if run.reference_drivers is not None else None,
     )
     personas = [*run.manifest["personas"], *run.campaign.mixed_people]
-    return replace(tables, acceptance=judge(asked.bounds, asked.ego, personas, run.campaign.seeds, evidence))
+    return replace(tables, acceptance=judge(acceptance.bounds, acceptance.ego, personas, run.campaign.seeds, evidence))
 
 
 def csv_tables(run: ReadRun, tables: RunTables) -> dict[str, pd.DataFrame]:
@@ -75,6 +79,7 @@ def csv_tables(run: ReadRun, tables: RunTables) -> dict[str, pd.DataFrame]:
     names = ["episodes", "training", "summary", "comparisons", "causes", "manoeuvres", "realism", "undecided"]
     names += ["attribution"] if run.campaign.attribution is not None else []
     names += ["reference_drivers", "preventability"] if run.reference_drivers is not None else []
+    names += ["over_trainings"] if len(tables.over_trainings) else []
     names += ["populations"] if run.campaign.population else []
     names += ["reconfiguration"] if is_tuned(run.manifest) else []
     found = {"conduct": run.conduct} | {name: getattr(tables, name) for name in names}

@@ -54,7 +54,7 @@ def _lines(campaign: Campaign, tables: RunTables, verdicts: Verdicts) -> Iterato
         yield ShownLine(text=f"Did not learn: {name}: {shortfall}", style="bold yellow", is_failure=True)
     for persona, verdict, causes in verdicts:
         yield ShownLine(text=f"{persona}, {verdict.question}: {verdict.label}", style=_STYLES[verdict.tone])
-        for sentence in filter(None, (verdict.sentence, *causes, verdict.speed)):
+        for sentence in filter(None, (verdict.sentence, *causes, verdict.speed, verdict.scope)):
             yield ShownLine(text=f"  {sentence}")
     for step in to_learn(tables):
         yield ShownLine(text=f"To try: {plain(step.sentence)}")

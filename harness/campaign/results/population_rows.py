@@ -1,4 +1,4 @@
-"""The games against populations by the persona that drove in them."""
+"""The table `populations`: the games against a population, by the persona that drove in them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def by_who_drove(campaign: Campaign, episodes: pd.DataFrame) -> pd.DataFrame:
     """A row for each arm against a population, seed and persona that drove in it, the table `populations`. With several
     people, the personas in their places.
 
-    The draw is repeated here: it depends on the place, the arm's seed and the episode only.
+    The draw is repeated here: it depends on the place, the seed of the starts and the episode only.
     """
     frames = []
     for population in campaign.population:
@@ -29,10 +29,11 @@ def by_who_drove(campaign: Campaign, episodes: pd.DataFrame) -> pd.DataFrame:
         for arm in [against_persona(ego, name).name for ego in egos]:
             games = episodes[episodes["arm"] == arm]
             players = range(NON_EGO, NON_EGO + len(people_in(games.columns)))
-            drivers = [
-                ", ".join(names[member_in_episode(shares, player, int(seed), int(episode))] for player in players)
-                for seed, episode in zip(games["seed"], games["episode"], strict=True)
+            members = [
+                [member_in_episode(shares, player, campaign.start_seed, int(episode)) for player in players]
+                for episode in games["episode"]
             ]
+            drivers = [", ".join(names[each] for each in of_game) for of_game in members]
             rows = summarise(games.assign(persona=drivers)).sort_values(["seed", "persona"], kind="stable")
             frames.append(rows[["arm", "seed", "persona", *_SUMMARY_COLUMNS]].assign(population=name))
     return joined("populations", frames)
