@@ -169,7 +169,7 @@ def compare(
         Path | None, typer.Option(metavar="FILE", help="The page.  [default: compare.html in the second folder]")
     ] = None,
 ) -> None:
-    """Compare two runs, game by game: failures, near misses and average speed of every arm that both have."""
+    """Compare two runs, game by game: failures, near misses, harm to others and speed of every arm that both have."""
     from rich.console import Console
 
     from harness.campaign.results.compare_runs import compare_runs

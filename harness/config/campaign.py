@@ -147,8 +147,12 @@ class Acceptance(Document):
     """Largest rate of failures against a persona that a reference driver prevents when it drives the game from its
     start. Measured with assessment.reference_drivers."""
     near_miss_rate: Share | None = None
-    """Largest share of games with a near miss against a persona: no contact, but closer than the bounds of the column
-    `near_miss` of episodes.csv."""
+    """Largest share of games with a near miss against a persona: no contact, but too close by time to collision,
+    post-encroachment time or time headway, as the columns `near_miss_...` of episodes.csv say."""
+    harm_to_others_rate: Share | None = None
+    """Largest share of games against a persona in which others fail without the ego: a person touches the edge of the
+    drivable area, or a person or a vehicle of the background traffic touches another road user. An ego that saves
+    itself must not leave the crash to others."""
     speed_loss_mps: Annotated[float, Field(ge=0.0, le=100.0)] | None = None
     """Largest loss of average speed against a persona, compared with the naive ego in the same games."""
     gap_share: Annotated[float, Field(ge=0.0, le=1000.0)] | None = None

@@ -9,6 +9,7 @@ from dataclasses import replace
 from harness.evaluation.attribution_columns import ATTRIBUTION, UNDECIDED
 from harness.evaluation.column import COUNT, FLAG, MAYBE, NUMBER, OF_METRIC, P_VALUE, POINTS, SHARE, TEXT, Column
 from harness.evaluation.measured_game import METRICS_OF_CONDUCT, METRICS_OF_GAMES, METRICS_OF_PLAYERS
+from harness.evaluation.severity.closeness import CRITERIA
 
 _EXACT, _T = "95 % Clopper-Pearson interval", "95 % t interval"
 _CROSSED = "95 % interval over trainings and starts (a two-level bootstrap)"
@@ -38,6 +39,9 @@ _REASON = Column("reason", TEXT, "Why the question is not answered; else empty."
 _VERDICT = Column("verdict", TEXT, "What the row says about its question.")
 _FAILED = "Share of the games in which the ego failed."
 _FAILURE_RATE = Column("failure_rate", NUMBER, _FAILED, unit=SHARE)
+
+
+_GREATER = "the greater of ego_delta_v_mps and other_delta_v_mps."
 
 
 def _outcome(role: str, who: str) -> Column:
@@ -76,7 +80,23 @@ def _summary() -> Iterator[Column]:
     interval = f"{_EXACT} (empty with several people)"
     yield from _rate("non_ego_goal_rate", "Share of the people that reached their goals.", interval)
     yield from _means("person")
-    yield from _rate("near_miss_rate", "Share of the games with a near miss.")
+    yield from _rate("near_miss_rate", "Share of the games with a near miss, by any criterion.")
+    for criterion in CRITERIA:
+        meaning = f"Near misses by a {criterion.bound}. A game can meet several criteria."
+        yield Column(f"near_misses_by_{criterion.name}", MAYBE, meaning)
+    yield Column("person_failures", MAYBE, "Games with person_failed: a person fails in a contact without the ego.")
+    yield Column("bystander_failures", MAYBE, "Games with bystander_failed: background traffic does.")
+    yield from _rate("harm_to_others_rate", "Share of the games with harm_to_others: a person or a bystander does.")
+    meaning = "Mean over the games of the strongest braking of the vehicle that follows the ego; empty without one."
+    yield Column("follower_max_deceleration_mps2", NUMBER, meaning)
+    meaning = "Mean over the collisions of the closing speed with the road user that the ego touched."
+    yield Column("closing_speed_mps", NUMBER, meaning)
+    yield Column("delta_v_mps", NUMBER, f"Mean over the collisions of {_GREATER}")
+    yield Column("max_delta_v_mps", NUMBER, f"The greatest value over the collisions of {_GREATER}")
+    for end, bound in (("low", "lower"), ("high", "upper")):
+        meaning = f"Mean of mais3_risk_{end} over the collisions in which it is known: the {bound} bound of the "
+        meaning += "probability that a collision injures somebody seriously (MAIS3+)."
+        yield Column(f"mais3_risk_{end}", NUMBER, meaning, unit=SHARE)
 
 
 _STRATEGIES = (Column("ego", TEXT, "The strategy of the ego."), Column("non_ego", TEXT, "That of the non-ego."))
@@ -158,7 +178,12 @@ _TABLES = {
     "summary": tuple(_summary()),
     "comparisons": (
         *(_QUESTION, PERSONA, SEED),
-        Column("metric", TEXT, "`failure` or `mean_speed`."),
+        Column(
+            "metric",
+            TEXT,
+            "`failure` or `mean_speed`; of RQ2 also harm to others: `person_failure`, `bystander_failure` and "
+            "`follower_braking`, whose H1 is that it grows.",
+        ),
         *_PAIRS,
         Column(
             "mean_difference",
@@ -172,7 +197,13 @@ _TABLES = {
         Column("t", NUMBER, "The t statistic; empty where all differences are equal.", source=_PAPER),
         *(_P, _P_PLANNED, _PLANNED),
         Column("effect_size", NUMBER, "Cohen's d_z: mean over standard deviation.", label="effect size d_z"),
-        Column("mcnemar_p", NUMBER, "McNemar's exact test of failures.", unit=P_VALUE, label="McNemar p"),
+        Column(
+            "mcnemar_p",
+            NUMBER,
+            "McNemar's exact test of failures, of the ego or others.",
+            unit=P_VALUE,
+            label="McNemar p",
+        ),
         Column("rejects_h0", FLAG, "Whether p_value is below the significance.", label="rejects H0 (p alone)"),
         *(_VERDICT, _ABOUT, _REASON),
     ),

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from typing import Any
 
-from harness.evaluation import conduct  # enters its metrics
+from harness.evaluation import conduct, harm  # they enter their metrics
 from harness.evaluation.metrics import METRICS, Drive
 from harness.evaluation.people import COLLIDED_WITH
 from harness.evaluation.recorded_game import RecordedGame
-from harness.evaluation.severity import measures  # enters its metrics
+from harness.evaluation.severity import injury, measures  # they enter their metrics
 from harness.game.outcome import Outcome
 from harness.game.roles import EGO, ROLES
 
 METRICS_OF_PLAYERS = tuple(each for each in METRICS if {"ego", "person"} & {*each.whose})
 METRICS_OF_CONDUCT = tuple(each for each in METRICS if "conduct" in each.whose)
 METRICS_OF_GAMES = tuple(each for each in METRICS if not {"ego", "person", "conduct"} & {*each.whose})
-assert conduct  # used for what its import enters
+assert conduct  # used for what its import enters, as are these
+assert harm
+assert injury
 assert measures
 
 

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 
 from harness.game.seeding import between, generator_of
 
+FOLLOWER = "follower"
+"""Its name among the road users of a game."""
 TIME_GAPS_S = (1.0, 2.0)
 """Range of the time gap: headways in the rush hour on US-101 are 1 to 2 s, and seldom shorter."""
 REACTIONS_S = (1.25, 1.5)

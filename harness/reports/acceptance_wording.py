@@ -14,6 +14,7 @@ TITLES = {
     "failure_rate_alone": "failures without the non-ego",
     "preventable_failure_rate": "preventable failures",
     "near_miss_rate": "near misses",
+    "harm_to_others_rate": "harm to others",
     "speed_loss_mps": "average speed lost",
     "gap_share": "best-response gap of the ego",
 }
@@ -50,13 +51,14 @@ def acceptance_lines(checks: Sequence[Check], seeds: int) -> list[Line]:
 
 
 def sentence(check: Check) -> str:
-    """What was measured and where, the end of the interval, and the bound."""
+    """What was measured and where, the end of the interval, the bound, and what the value is made of."""
     if not check.measured:
         return "not measured" if check.games else f"not measured: {check.arm} was not played"
     value, limit, allowed = (_value(check.bound, each) for each in (check.value, check.limit, check.allowed))
-    return (
+    words = (
         f"{value} in {check.games:,} games of {check.arm}; with {SURE} confidence at most {limit}; allowed: {allowed}"
     )
+    return f"{words}; {check.detail}" if check.detail else words
 
 
 def headline(checks: Sequence[Check]) -> str:

@@ -13,6 +13,7 @@ from markupsafe import Markup
 
 from harness.evaluation.column import COUNT, FLAG, MAYBE, OF_METRIC, P_VALUE, POINTS, SHARE, TEXT, Column
 from harness.evaluation.tables import columns_of, exact, typed
+from harness.reports.differences import METRIC_WORDS
 from harness.reports.numbers import MISSING, number, p_number, trimmed
 
 PACKED = ("episodes", "training", "reconfiguration")
@@ -80,5 +81,6 @@ def _text(column: Column, value: Any, metric: str) -> str:
     if column.unit in (SHARE, POINTS):
         return trimmed(value * 100, 1)
     if column.unit == OF_METRIC:
-        return f"{number(value * 100, 1)} points" if metric == "failure" else f"{number(value, 3)} m/s"
+        unit = METRIC_WORDS[metric].unit
+        return f"{number(value, 3)} {unit}" if unit else f"{number(value * 100, 1)} points"
     return number(value, 2)

@@ -9,11 +9,36 @@ significance of 2.5 % each.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
+from harness.evaluation.comparisons.comparison import METRICS, SHARES
 from harness.evaluation.competence import Verdict
 from harness.reports.numbers import MISSING, NO_SPACE, SURE, number, p_text, signed, trimmed
 from harness.reports.run_tables import Row
 
+
+class MetricWords(NamedTuple):
+    """A quantity that comparisons.csv compares, in words."""
+
+    name: str
+    more: str
+    less: str
+    unit: str = ""
+    """Empty: a share of games."""
+
+
+METRIC_WORDS = {
+    "failure": MetricWords("failures", "more failures", "fewer failures"),
+    "mean_speed": MetricWords("average speed", "faster", "slower", "m/s"),
+    "person_failure": MetricWords("failures of people", "more failures of people", "fewer failures of people"),
+    "bystander_failure": MetricWords(
+        "failures of bystanders", "more failures of bystanders", "fewer failures of bystanders"
+    ),
+    "follower_braking": MetricWords(
+        "strongest braking of the follower", "harder braking of the follower", "gentler braking of the follower", "m/s²"
+    ),
+}
+"""By their `metric`."""
 RELEVANT_SPEED_MPS = 0.25
 """The smallest difference of average speed that counts: just under 1 km/h, the step of a car's speedometer."""
 CHANCE = "the difference can be chance"
@@ -68,13 +93,12 @@ def is_equivalent(row: Row) -> bool:
 
 def statistics(row: Row) -> str:
     """A test of `comparisons` as one line: effect, interval and p-values."""
-    name = "Failures" if row["metric"] == "failure" else "Average speed"
-    parts = [effect(row), p_values(row)]
-    if row["metric"] == "failure":
+    parts, name = [effect(row), p_values(row)], METRIC_WORDS[row["metric"]].name
+    if row["metric"] in SHARES:
         parts.append(f"McNemar’s exact test {p_text(row['mcnemar_p'])}")
     else:
         parts.append(f"in either direction {p_text(two_sided_p(row))}")
-    return f"{name}: {'; '.join(parts)}."
+    return f"{name[:1].upper()}{name[1:]}: {'; '.join(parts)}."
 
 
 def too_few(pairs: int) -> str:
@@ -89,14 +113,13 @@ def effect(row: Row) -> str:
     mean, low, high = row["mean_difference"], row["ci_low"], row["ci_high"]
     if not math.isfinite(mean):
         return MISSING
-    failure = row["metric"] == "failure"
-    scale, digits, unit = (100, 1, " points") if failure else (1, 2, f"{NO_SPACE}m/s")
-    more_is_h1 = (row["question"] == "RQ1") == failure  # RQ1: fails more, drives slower; RQ2: the reverse
+    words = METRIC_WORDS[row["metric"]]
+    scale, digits, unit = (1, 2, f"{NO_SPACE}{words.unit}") if words.unit else (100, 1, " points")
+    more_is_h1 = METRICS[row["metric"]][1][row["question"]] > 0
     rises = (mean > 0) == more_is_h1
     if mean < 0:
         low, high = -high, -low
-    words = ("more failures", "fewer failures") if failure else ("faster", "slower")
-    text = f"{trimmed(abs(mean) * scale, digits)}{unit} {words[0 if rises else 1]}"
+    text = f"{trimmed(abs(mean) * scale, digits)}{unit} {words.more if rises else words.less}"
     if mean == 0:
         text = "none"
     if math.isfinite(low):

@@ -10,15 +10,22 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from harness.evaluation.comparisons.comparison import HARM, SHARES
+from harness.evaluation.comparisons.harm_clauses import Beside, harm_clauses
+from harness.evaluation.comparisons.near_misses import by_criterion, near_misses
+from harness.evaluation.competence import Verdict
 from harness.evaluation.strategies import Arm, EgoStrategy, PersonaNonEgo
 from harness.game.human_factors import Attention
 from harness.game.roles import NON_EGO
 from harness.reports.differences import NO_RELEVANT_DIFFERENCE, faster_by, is_equivalent
 from harness.reports.numbers import NO_SPACE, number, percent, sure
-from harness.reports.run_tables import RunTables
+from harness.reports.run_tables import RunTables, played
+from harness.reports.severity_wording import severity_clause
 from harness.reports.verdict_wording import Answer
 
+SEVERITY = "Severity of collisions"
 NEAR_MISSES = "Near misses"
+HARM_TO_OTHERS = "Harm to others"
 WORST_KNOWN_OPPONENT = "Against its worst known opponent"
 PRICE = "Price of {doing} in speed"
 PARTLY = "Partly"
@@ -37,7 +44,7 @@ class KeyFigure:
 
 def key_figures(persona: str, tables: RunTables) -> list[KeyFigure]:
     """The lines of a persona's card, those that can be measured."""
-    parts = (_causes, _preventable, _near_misses, _worst_opponent, _price)
+    parts = (_causes, _severity, _preventable, _near_misses, _harm, _worst_opponent, _price)
     return [figure for part in parts for figure in part(persona, tables) if figure.lines]
 
 
@@ -65,14 +72,40 @@ def _preventable(persona: str, tables: RunTables) -> Iterator[KeyFigure]:
     yield KeyFigure(title="Preventable", lines=lines)
 
 
+def _severity(persona: str, tables: RunTables) -> Iterator[KeyFigure]:
+    clauses = [severity_clause(made, list(tables.rates_of(arm).values())) for _, made, arm in egos_of(persona, tables)]
+    yield KeyFigure(title=SEVERITY, lines=[clause for clause in clauses if clause])
+
+
 def _near_misses(persona: str, tables: RunTables) -> Iterator[KeyFigure]:
     lines, last = [], 0.0
     for _, made, arm in egos_of(persona, tables):
-        marks = tables.games_of(arm)["near_miss"].dropna()
-        if len(marks):
-            last = float(marks.mean())
-            lines.append(f"{int(marks.sum())} of {len(marks)} games of the {made} ({percent(last)})")
+        rows = [row for row in tables.rates_of(arm).values() if row["near_miss_rate"] >= 0.0]
+        if rows:
+            near, games = sum(map(near_misses, rows)), sum(map(played, rows))
+            last = near / games
+            lines.append(f"{near} of {games} games of the {made} ({percent(last)}): {by_criterion(rows)}")
     yield KeyFigure(title=NEAR_MISSES, lines=lines, warns=last >= OFTEN)
+
+
+def harm_of(persona: str, tables: RunTables) -> dict[str, str]:
+    """What happens to others beside each ego of a persona's card, the last ego first: a clause by the `metric` of
+    comparisons.csv."""
+    egos = [Beside(f"the {made}", list(tables.rates_of(arm).values())) for _, made, arm in egos_of(persona, tables)]
+    return harm_clauses(*reversed(egos))
+
+
+def _harm(persona: str, tables: RunTables) -> Iterator[KeyFigure]:
+    grown = {
+        row["metric"]
+        for row in tables.tests_of("RQ2", persona)
+        if row["metric"] in HARM & SHARES
+        and row["mean_difference"] > 0.0
+        and (row["rejects_h0"] or row["verdict"] == Verdict.ALL_EQUAL.value)
+    }
+    clauses = harm_of(persona, tables)
+    lines = sorted(clauses, key=lambda metric: metric in grown)
+    yield KeyFigure(title=HARM_TO_OTHERS, lines=[clauses[metric] for metric in lines], warns=bool(grown))
 
 
 def _worst_opponent(persona: str, tables: RunTables) -> Iterator[KeyFigure]:

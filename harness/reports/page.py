@@ -14,7 +14,7 @@ from harness.reports.arm_glossary import glossary
 from harness.reports.attribution_section import attribution_section
 from harness.reports.cards import CAUTION, card
 from harness.reports.data_table import table
-from harness.reports.differences import effect
+from harness.reports.differences import METRIC_WORDS, effect
 from harness.reports.embedding import GameTracks, embedded_games, recorded_document
 from harness.reports.game import game_section
 from harness.reports.game_links import GameLinks
@@ -40,7 +40,6 @@ CAPTIONS = {
     "reconfiguration": "A row per trial and parameter of a search.",
 }
 """Of the tables that are shown as the CSV files have them."""
-METRICS = {"failure": "failures", "mean_speed": "average speed"}
 REPLAYS_SHOWN = 12
 """`harness replay RUN --list` lists all."""
 
@@ -66,7 +65,7 @@ def render_page(tables: RunTables, games: Iterable[GameTracks] = (), scene: Mapp
         cards=[card(persona, place, tables, links) for place, persona in enumerate(tables.personas, 1)],
         most_dots=MOST_DOTS if tables.episodes.groupby("arm").size().max() > MOST_DOTS else 0,
         caution=CAUTION,
-        metrics=METRICS,
+        metrics={metric: words.name for metric, words in METRIC_WORDS.items()},
         effect=effect,
         planned=planned_in_words(tables),
         embedded=texts,

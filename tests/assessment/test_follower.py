@@ -11,7 +11,7 @@ import pytest
 from harness.assessment.rollout import assess
 from harness.drivers.sumo import SumoDriver
 from harness.game.arrays import FloatArray, IntArray
-from harness.road.scene.following import FOLLOWER
+from harness.game.follower import FOLLOWER
 from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.rollouts import Steady, arm, play, trace
 
@@ -64,3 +64,5 @@ def test_assess__contact_from_behind_is_a_collision_of_the_ego(merge: OpenScene)
     record = game.record
     assert (record["ego_outcome"], record["impact_side"]) == ("collision", "rear")
     assert record["closing_speed_mps"] > 0.0
+    assert record["bystander_failed"] == 0  # a contact with the ego is the ego's
+    assert 0.0 < record["follower_max_deceleration_mps2"] <= 6.1

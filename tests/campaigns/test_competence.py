@@ -47,7 +47,7 @@ def test_terminal__names_each_training_that_did_not_learn_and_answers_no_questio
 
 def test_comparisons__have_a_reason_and_no_test(run: Path) -> None:
     table = read_csv(run / "comparisons.csv")
-    assert len(table) == 4
+    assert table["question"].tolist() == ["RQ1"] * 2 + ["RQ2"] * 5
     assert set(table["verdict"]) <= {verdict.value for verdict in WITHHELD}
     assert table[["p_value", "p_holm"]].isna().all(axis=None)
     assert not table["rejects_h0"].any()

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from harness.environments.arena import Arena, Seat
-from harness.game.follower import Follower
+from harness.game.follower import FOLLOWER, Follower
 from harness.game.initial_state import InitialState
 from harness.game.outcome import Outcome
-from harness.road.scene.following import FOLLOWER, FOLLOWER_TYPE
+from harness.road.scene.following import FOLLOWER_TYPE
 from harness.road.scene.open_scene import OpenScene
 from tests.support.scenes import LEFT_Y, RIGHT_Y, build_scene, placed
 

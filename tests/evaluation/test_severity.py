@@ -17,8 +17,8 @@ from harness.environments.recorded import kinds_of
 from harness.evaluation.measured_game import METRICS_OF_GAMES, measured
 from harness.evaluation.recorded_game import BodyKind
 from harness.evaluation.severity.contact import impact_angle_rad, needed_braking_mps2, post_encroachment_s
+from harness.evaluation.severity.impact import side_of
 from harness.evaluation.severity.limits import mass_kg
-from harness.evaluation.severity.measures import side_of
 from harness.game.geometry import Box
 from harness.game.sight import Hiding
 from harness.game.world import World
@@ -35,6 +35,7 @@ KINDS = {
     "truck": BodyKind(vehicle_class="truck"),
     "foot": BodyKind(length_m=0.5, width_m=0.5, vehicle_class="pedestrian"),
 }
+NEAR = ("near_miss", "near_miss_ttc", "near_miss_pet", "near_miss_headway")
 QUARTER = 0.5 * math.pi
 
 
@@ -58,13 +59,19 @@ def cells_of(world: World, trace: pd.DataFrame) -> dict[str, Any]:
         (
             14.0,
             rows("non_ego", along(26.5, -1.6, 0.0, 4.0, 3)),
-            {"closing_speed_mps": 10.0, "ego_delta_v_mps": 5.0, "other_delta_v_mps": 5.0, "severity": 305.0},
+            {
+                "mais3_risk_high": 0.1,
+                "closing_speed_mps": 10.0,
+                "ego_delta_v_mps": 5.0,
+                "other_delta_v_mps": 5.0,
+                "severity": 305.0,
+            },
         ),
         # 70 kg at rest, 1500 kg at 10 m/s: 10 * 1500 / 1570 = 9.554
         (
             10.0,
             rows("walker", along(24.5, -1.6, QUARTER, 0.0, 3), kind="foot"),
-            {"other_delta_v_mps": 9.554, "severity": 309.554},
+            {"other_delta_v_mps": 9.554, "severity": 309.554, "mais3_risk_low": 0.1},  # 36 km/h
         ),
         # ego 12 m/s east, the other 5 m/s north: 13 m/s; it reaches the ego's right side at y = -1.6 - 0.9
         (
@@ -194,10 +201,29 @@ def test_closeness__of_following_at_a_lower_speed_each_step(merge: Any) -> None:
     assert cells["time_integrated_ttc_s2"] == pytest.approx(0.1 * sum(max(1.5 - each, 0.0) for each in ttc))
     assert cells["needed_braking_mps2"] == pytest.approx(4.0**2 / (2.0 * 4.0), abs=0.01)
     assert cells["used_braking_mps2"] == 0.0
-    assert cells["near_miss"] == 1
+    assert [cells[name] for name in NEAR] == [1, 1, 0, 1]
     # TTC 1 s of 1.5 s, headway 0.25 s of 0.5 s: 100 / (1 + 0.5)
     assert cells["severity"] == pytest.approx(100.0 / 1.5)
     assert "closing_speed_mps" not in cells
+
+
+@pytest.mark.parametrize(("leader_mps", "is_near"), [(16.5, 0), (16.0, 1), (15.9, 1)])
+def test_headway__behind_a_faster_car_is_no_near_miss(leader_mps: float, is_near: int, merge: Any) -> None:
+    # 3 m at 16 m/s: 0.1875 s; the gap opens, stays, and closes so slowly that the TTC is 3 / 0.1 = 30 s
+    ego = rows("ego", along(20.0, -1.6, 0.0, 16.0, 6), kind="ego_car", end="goal")
+    cells = severity(merge, ego, rows("non_ego", along(27.8, -1.6, 0.0, leader_mps, 6)))
+    assert cells["min_time_headway_s"] == pytest.approx(3.0 / 16.0, abs=0.02)
+    assert [cells[name] for name in NEAR] == [is_near, 0, 0, is_near]
+    assert (cells["severity"] >= 50.0) == bool(is_near)
+
+
+def test_near_miss__by_post_encroachment_time_alone(merge: Any) -> None:
+    # at 10 m/s the ego's rear leaves x = 50.9 after (50.9 - 20 + 2.3) / 10 = 3.32 s; the other's front, at 10 m/s from
+    # the right, enters y = -2.5 at 4.16 s: 0.9 s in steps of 0.1 s. The two never are on a collision course.
+    ego = rows("ego", along(20.0, -1.6, 0.0, 10.0, 60), kind="ego_car", end="goal")
+    cells = severity(merge, ego, rows("non_ego", along(50.0, -46.6, QUARTER, 10.0, 60)))
+    assert cells["min_post_encroachment_time_s"] == pytest.approx(0.9)
+    assert [cells[name] for name in NEAR] == [1, 0, 1, 0]
 
 
 def test_used_braking__counts_from_when_braking_was_needed(merge: Any) -> None:

@@ -77,7 +77,10 @@ def test_summarise__agrees_with_the_arithmetic_on_paper():
 
 def test_summarise__near_misses_are_a_share_of_the_games_in_which_they_could_be_measured():
     marks = (1, 0, None, 1, 0)
-    row = summarise(episodes_of(*(game(episode=k, near_miss=mark) for k, mark in enumerate(marks)))).iloc[0]
+    near = [{f"near_miss{end}": mark for end in ("", "_ttc")} for mark in marks]
+    row = summarise(episodes_of(*(game(episode=k, **cells) for k, cells in enumerate(near)))).iloc[0]
+    assert row["near_misses_by_ttc"] == 2
+    assert pd.isna(row["near_misses_by_pet"])
     assert row["near_miss_rate"] == 0.5
     # Clopper-Pearson for 2 of 4, symmetric about a half
     assert row["near_miss_rate_low"] == pytest.approx(1 - row["near_miss_rate_high"])

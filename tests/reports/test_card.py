@@ -8,6 +8,7 @@ import pytest
 from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.strategies import Arm, NaiveEgo, PersonaNonEgo, RetrainedEgo, against_persona
 from harness.reports.key_figures import (
+    HARM_TO_OTHERS,
     NEAR_MISSES,
     PARTLY,
     PRICE,
@@ -20,17 +21,20 @@ from harness.reports.numbers import NO_SPACE
 from harness.reports.run_tables import RunTables
 from harness.reports.verdict_wording import answer
 from tests.support.game_tables import arm, table
-from tests.support.pages import campaign
+from tests.support.pages import campaign, recomputed
 
 
 def found(arguments, near_misses=None):
-    """The looked-up tables of a made-up campaign; `near_misses` are the shares of an arm's games that come close."""
+    """The looked-up tables of a made-up campaign; `near_misses` are the shares of an arm's games that come close, by
+    time to collision."""
     episodes = arguments["episodes"]
     for name, share in (near_misses or {}).items():
         rows = episodes["arm"] == name
         marks = [int(place < share * rows.sum()) for place in range(int(rows.sum()))]
-        episodes.loc[rows, "near_miss"] = pd.Series(marks, index=episodes.index[rows], dtype="Int64")
-    return RunTables(**arguments)
+        for column in ("near_miss", "near_miss_ttc", "near_miss_pet", "near_miss_headway"):
+            values = marks if column in ("near_miss", "near_miss_ttc") else [0] * len(marks)
+            episodes.loc[rows, column] = pd.Series(values, index=episodes.index[rows], dtype="Int64")
+    return RunTables(**(recomputed(arguments) if near_misses else arguments))
 
 
 def figures_of(run):
@@ -52,8 +56,8 @@ def test_near_misses__of_an_ego_without_failures_are_on_its_card():
     run = found(campaign(personas=["speedy"]), {"naive_vs_speedy": 0.1, "retrained_vs_speedy": 0.95})
     figure = figures_of(run)[NEAR_MISSES]
     assert [line.replace(NO_SPACE, " ") for line in figure.lines] == [
-        "6 of 60 games of the naive ego (10 %)",
-        "57 of 60 games of the retrained ego (95 %)",
+        "6 of 60 games of the naive ego (10 %): 6 by time to collision of at most 1.5 s",
+        "57 of 60 games of the retrained ego (95 %): 57 by time to collision of at most 1.5 s",
     ]
     assert figure.warns
 
@@ -63,6 +67,38 @@ def test_verdict__an_ego_that_comes_too_close_is_mended_only_in_part(share, labe
     run = found(campaign(personas=["speedy"]), {"retrained_vs_speedy": share})
     shown = card_verdict("Did retraining fix it?", answer(run, "RQ2", "speedy"), key_figures("speedy", run))
     assert (shown["label"], shown["tone"], bool(shown["caution"])) == (label, tone, label == PARTLY)
+
+
+def harmed(beside_naive, beside_retrained):
+    """A campaign in which so many of 60 people fail without the ego."""
+    arguments = campaign(personas=["speedy"])
+    episodes = arguments["episodes"]
+    for name, count in (("naive_vs_speedy", beside_naive), ("retrained_vs_speedy", beside_retrained)):
+        rows = episodes["arm"] == name
+        marks = pd.Series([1] * count + [0] * (60 - count), index=episodes.index[rows], dtype="Int64")
+        for column in ("person_failed", "harm_to_others"):
+            episodes.loc[rows, column] = marks
+        episodes.loc[rows, "follower_max_deceleration_mps2"] = 2.0 + count / 20.0
+    return found(recomputed(arguments))
+
+
+def test_harm__that_retraining_leaves_to_others_makes_the_answer_partly():
+    run = harmed(1, 20)
+    figure = figures_of(run)[HARM_TO_OTHERS]
+    assert figure.lines == [
+        "at its strongest the follower brakes by 3.0 m/s² beside the retrained ego, and by 2.0 m/s² beside the naive "
+        "ego (mean over the games)",
+        "a person fails in 20 of 60 games beside the retrained ego, and in 1 of 60 beside the naive ego",
+    ]
+    assert figure.warns
+    shown = card_verdict("Did retraining fix it?", answer(run, "RQ2", "speedy"), key_figures("speedy", run))
+    assert (shown["label"], shown["tone"]) == (PARTLY, "open")
+    assert shown["caution"] == f"But harm to others: {figure.lines[-1]}."
+
+
+@pytest.mark.parametrize(("before", "after"), [(14, 15), (20, 1), (0, 0)])
+def test_harm__that_does_not_grow_is_no_warning(before, after):
+    assert not figures_of(harmed(before, after))[HARM_TO_OTHERS].warns
 
 
 @pytest.mark.parametrize(("drives", "who"), [(True, "The speedy driver"), (False, "The speedy")])

@@ -293,6 +293,8 @@ def test_p_values__are_also_shown_after_holms_correction():
         ("RQ1", "mean_speed", 0.25, "0.25 m/s slower (95 %: 0.15 to 0.35)"),
         ("RQ2", "mean_speed", 0.25, "0.25 m/s faster (95 %: 0.15 to 0.35)"),
         ("RQ2", "mean_speed", -0.25, "0.25 m/s slower (95 %: 0.15 to 0.35)"),
+        ("RQ2", "person_failure", 0.25, "25 points more failures of people (95 %: 15 to 35)"),
+        ("RQ2", "follower_braking", -0.25, "0.25 m/s² gentler braking of the follower (95 %: 0.15 to 0.35)"),
         ("RQ2", "mean_speed", 0.098, "0.1 m/s faster (95 %: \N{MINUS SIGN}0.002 to 0.2)"),
     ],
 )

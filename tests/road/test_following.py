@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from harness.errors import UsageError
-from harness.game.follower import Follower
+from harness.game.follower import FOLLOWER, Follower
 from harness.game.initial_state import InitialState
 from harness.road.demand.route_file import CAR_SIZE_M
-from harness.road.scene.following import FOLLOWER, FOLLOWER_TYPE
+from harness.road.scene.following import FOLLOWER_TYPE
 from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.repository import REPOSITORY
 from tests.support.scenes import CROSSING, CROSSING_EDGES, CROSSING_NODES, LEFT_Y, RIGHT_Y, build_scene, placed

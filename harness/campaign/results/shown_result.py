@@ -13,9 +13,10 @@ from harness.errors import plain
 from harness.evaluation.unplayed_games import reasons_of
 from harness.reports.acceptance_wording import acceptance_lines
 from harness.reports.game import gap_verdicts
+from harness.reports.key_figures import harm_of
 from harness.reports.next_steps import to_learn
 from harness.reports.run_tables import QUESTIONS, RunTables
-from harness.reports.verdict_wording import Answer, answer
+from harness.reports.verdict_wording import Answer, answer, as_sentence
 
 Verdicts: TypeAlias = Sequence[tuple[str, Answer, tuple[str, ...]]]
 """Of each persona and question: the answer, and why the ego failed, a line for each kind of cause."""
@@ -54,7 +55,9 @@ def _lines(campaign: Campaign, tables: RunTables, verdicts: Verdicts) -> Iterato
         yield ShownLine(text=f"Did not learn: {name}: {shortfall}", style="bold yellow", is_failure=True)
     for persona, verdict, causes in verdicts:
         yield ShownLine(text=f"{persona}, {verdict.question}: {verdict.label}", style=_STYLES[verdict.tone])
-        for sentence in filter(None, (verdict.sentence, *causes, verdict.speed, verdict.scope)):
+        is_compared = verdict.question == "RQ2" and tables.asked("RQ2", persona)
+        harm = map(as_sentence, harm_of(persona, tables).values()) if is_compared else ()
+        for sentence in filter(None, (verdict.sentence, *causes, verdict.speed, *harm, verdict.scope)):
             yield ShownLine(text=f"  {sentence}")
     for step in to_learn(tables):
         yield ShownLine(text=f"To try: {plain(step.sentence)}")

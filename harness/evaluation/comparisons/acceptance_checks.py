@@ -11,12 +11,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from harness.evaluation.comparisons.comparison import games_by_arm, mean_interval, pairs_of
+from harness.evaluation.comparisons.harm_clauses import Beside, harm_clauses
+from harness.evaluation.comparisons.near_misses import by_criterion
 from harness.evaluation.comparisons.preventability import ANY
 from harness.evaluation.strategies import (
     Arm,
@@ -51,6 +53,8 @@ class Check:
     """The bound."""
     games: int
     """The games, or pairs of games, in which it was measured."""
+    detail: str = ""
+    """What the value is made of, in words; empty: nothing to add."""
 
     @property
     def measured(self) -> bool:
@@ -95,8 +99,14 @@ class Subject:
     seed: int
 
 
-Measured = tuple[str, float, float, int]
-"""Arm, value, limit and number of games."""
+class Measured(NamedTuple):
+    """What was measured for one bound in one arm, as in `Check`."""
+
+    arm: str
+    value: float
+    limit: float
+    games: int
+    detail: str = ""
 
 
 def judge(
@@ -113,10 +123,10 @@ def judge(
             for seed in seeds:
                 subject = Subject(ego=judged_ego(judged, persona, seed, evidence), persona=persona, seed=seed)
                 check = partial(Check, bound=name, persona=persona, seed=seed, allowed=allowed)
-                for arm, value, limit, games in _measured(name, subject, evidence):
+                for measured in _measured(name, subject, evidence):
                     if evidence.unanswered(persona, seed):
-                        value = limit = np.nan
-                    checks.append(check(arm=arm, value=value, limit=limit, games=games))
+                        measured = measured._replace(value=np.nan, limit=np.nan, detail="")
+                    checks.append(check(**measured._asdict()))
     return checks
 
 
@@ -160,7 +170,8 @@ def _measured(bound: str, subject: Subject, evidence: Evidence) -> Iterator[Meas
                 if bound == "preventable_failure_rate":
                     yield _preventable(arm, subject.seed, evidence)
                 else:
-                    yield _rate(bound, arm, subject.seed, evidence)
+                    measured = _rate(bound, arm, subject.seed, evidence)
+                    yield measured._replace(detail=_detail(bound, arm, subject, evidence))
 
 
 def _arms_against(subject: Subject, evidence: Evidence) -> list[str]:
@@ -180,19 +191,37 @@ def _arms_against(subject: Subject, evidence: Evidence) -> list[str]:
 def _rate(column: str, arm: str, seed: int, evidence: Evidence) -> Measured:
     row = evidence.rows.get((arm, seed))
     if row is None:
-        return arm, np.nan, np.nan, 0
-    return arm, row[column], row[f"{column}_high"], row["episodes"] - row["errors"]
+        return Measured(arm, np.nan, np.nan, 0)
+    return Measured(arm, row[column], row[f"{column}_high"], row["episodes"] - row["errors"])
+
+
+def _detail(bound: str, arm: str, subject: Subject, evidence: Evidence) -> str:
+    """What a rate in an arm is made of; for harm to others also what it is beside the naive ego."""
+    row = evidence.rows.get((arm, subject.seed))
+    if row is None or not np.isfinite(row[bound]):
+        return ""
+    match bound:
+        case "near_miss_rate":
+            return by_criterion([row])
+        case "harm_to_others_rate":
+            egos = [Beside("this ego", [row])]
+            naive = evidence.rows.get((against_persona(NaiveEgo(), subject.persona).name, subject.seed))
+            if naive is not None and subject.ego != NaiveEgo():
+                egos.append(Beside("the naive ego", [naive]))
+            return "; ".join(harm_clauses(*egos).values())
+        case _:
+            return ""
 
 
 def _preventable(arm: str, seed: int, evidence: Evidence) -> Measured:
-    _, failure_rate, failure_limit, games = _rate("failure_rate", arm, seed, evidence)
+    failures = _rate("failure_rate", arm, seed, evidence)
     judged = evidence.preventability
     if judged is None:
-        return arm, np.nan, np.nan, 0
+        return Measured(arm, np.nan, np.nan, 0)
     for row in judged[(judged["arm"] == arm) & (judged["seed"] == seed)].to_dict("records"):
         if row["driver"] == ANY:
-            return arm, row["from_start_rate"], row["from_start_rate_high"], games
-    return (arm, 0.0, failure_limit, games) if failure_rate == 0.0 else (arm, np.nan, np.nan, 0)
+            return Measured(arm, row["from_start_rate"], row["from_start_rate_high"], failures.games)
+    return failures if failures.value == 0.0 else Measured(arm, np.nan, np.nan, 0)
 
 
 def _speed_loss(subject: Subject, evidence: Evidence) -> Measured:
@@ -201,7 +230,7 @@ def _speed_loss(subject: Subject, evidence: Evidence) -> Measured:
     losses = (before - after)[:, 0]
     value = float(losses.mean()) if len(losses) else np.nan
     _, high = mean_interval(losses)
-    return judged, value, high if np.isfinite(high) else value, len(losses)
+    return Measured(judged, value, high if np.isfinite(high) else value, len(losses))
 
 
 def _gap_shares(subject: Subject, evidence: Evidence) -> Iterator[Measured]:
@@ -210,6 +239,6 @@ def _gap_shares(subject: Subject, evidence: Evidence) -> Iterator[Measured]:
         if (row["role"], row["ego"], row["persona"], row["seed"]) == ("ego", ego, subject.persona, subject.seed):
             scale, found = abs(row["payoff"]) or np.nan, True
             high = row["ci_high"] if np.isfinite(row["ci_high"]) else row["gap"]
-            yield f"{ego}_vs_{row['non_ego']}", row["gap"] / scale, high / scale, row["pairs"]
+            yield Measured(f"{ego}_vs_{row['non_ego']}", row["gap"] / scale, high / scale, row["pairs"])
     if not found:
-        yield against_persona(subject.ego, subject.persona).name, np.nan, np.nan, 0
+        yield Measured(against_persona(subject.ego, subject.persona).name, np.nan, np.nan, 0)

@@ -11,6 +11,9 @@ and 4.3.2: in every row a positive `mean_difference` supports H1:
     RQ2       naive_vs_<persona> -> retrained_vs_<persona>     failure     baseline - treatment (fails less)
     RQ2                                                        mean_speed  treatment - baseline (faster)
 
+For RQ2 there are rows on harm to others, too (`HARM`): treatment - baseline of the games in which a person, or a
+bystander, fails without the ego, and of the follower's strongest braking. Their H1 is the harm.
+
 The same row also contains: the two-sided 95 % t interval of the mean difference; the effect
 size (Cohen's d_z, mean / standard deviation of the differences); for failures McNemar's exact test,
 one-tailed in the direction of H1 like the t-test (of the pairs in which exactly one game failed, is H1 right
@@ -19,6 +22,7 @@ in more than half? Binomial with p = 1/2; 1 when there are no such pairs).
 Every row is about one trained pair. The t-tests of failures are the primary tests, and Holm's correction is over all
 that the campaign plans (`evaluation.planned_tests`), whatever comes of them: a question that is not answered, not
 played or has no t statistic counts as a test with p = 1. Tests of the average speed are secondary and not corrected.
+Those of harm to others are secondary, and a family of their own.
 
 A question whose players were not shown to drive the scene alone, or whose person does not drive as people do
 (`competence.gate_of`), is not answered: its rows have pairs and a mean difference, which describe the games, and no
@@ -50,8 +54,16 @@ ROUNDING = 1e-12
 METRICS: Mapping[str, tuple[str, Mapping[ResearchQuestion, int]]] = {
     "failure": ("ego_failed", {"RQ1": +1, "RQ2": -1}),
     "mean_speed": ("ego_mean_speed_mps", {"RQ1": -1, "RQ2": +1}),
+    "person_failure": ("person_failed", {"RQ2": +1}),
+    "bystander_failure": ("bystander_failed", {"RQ2": +1}),
+    "follower_braking": ("follower_max_deceleration_mps2", {"RQ2": +1}),
 }
-"""The compared quantities: the column of each, and the sign of `treatment - baseline` under H1."""
+"""The compared quantities: the column of each, and for the questions that compare it the sign of `treatment - baseline`
+under H1."""
+SHARES = frozenset({"failure", "person_failure", "bystander_failure"})
+"""The quantities that are 0 or 1 in a game."""
+HARM = frozenset({"person_failure", "bystander_failure", "follower_braking"})
+"""Harm to others than the ego."""
 
 
 def compare(
@@ -72,13 +84,20 @@ def compare(
     """
     questions, games = list(questions), games_by_arm(episodes)
     planned = len(questions) if planned is None else planned
-    rows = [_row(question, metric, games, gate_of(question, games)) for question in questions for metric in METRICS]
+    rows = [
+        _row(question, metric, games, gate_of(question, games))
+        for question in questions
+        for metric, (_, signs) in METRICS.items()
+        if question.question in signs
+    ]
     table = pd.DataFrame(rows, columns=list(TABLES["comparisons"]))
     is_primary = table["metric"] == PRIMARY
     table["about"] = About.TRAINED_PAIR.value
     table["planned_tests"] = is_primary.map({True: planned, False: None})
     table["rejects_h0"] = table["p_value"].astype("float64") < significance
-    table["p_holm"] = holm(table["p_value"].where(is_primary).to_numpy(dtype=np.float64), planned)
+    is_harm, p_values = table["metric"].isin(HARM).to_numpy(), table["p_value"].to_numpy(dtype=np.float64)
+    table["p_holm"] = holm(np.where(is_primary, p_values, np.nan), planned)
+    table.loc[is_harm, "p_holm"] = holm(p_values[is_harm])
     return typed(with_verdicts(table, significance))
 
 
@@ -160,7 +179,7 @@ def _row(
     low, high = low[:, 0], high[:, 0]
     row = vars(question) | closed | {"metric": metric, "pairs": len(low), "pairs_left_out": left_out}
     row |= paired_t_test(low, high, closed)
-    if not closed["reason"] and metric == "failure" and len(low) >= 2:
+    if not closed["reason"] and metric in SHARES and len(low) >= 2:
         row["mcnemar_p"] = mcnemar(high - low, "greater")
     return row
 

@@ -5,7 +5,7 @@ has the same start in both runs, so the games are compared in pairs; otherwise o
 
 | measure | test, two-sided |
 | --- | --- |
-| failures, near misses | McNemar's exact test |
+| failures, near misses, failures of others without the ego | McNemar's exact test |
 | average speed | paired t-test, and equivalence by the 95 % interval |
 """
 
@@ -26,11 +26,18 @@ from harness.evaluation.comparisons.comparison import (
     measured_values,
     rate_cells,
 )
+from harness.evaluation.comparisons.near_misses import ANY_CRITERION
 from harness.game.arrays import FloatArray
 
-MEASURES = {"failures": "ego_failed", "near misses": "near_miss", "average speed": "ego_mean_speed_mps"}
+_RATES = {
+    "failures": "ego_failed",
+    f"near misses by {ANY_CRITERION}": "near_miss",
+    "failures of people without the ego": "person_failed",
+    "failures of bystanders without the ego": "bystander_failed",
+}
+MEASURES = {**_RATES, "average speed": "ego_mean_speed_mps"}
 """What is compared, and its column in episodes.csv."""
-RATES = ("failures", "near misses")
+RATES = (*_RATES,)
 
 
 @dataclass(frozen=True, kw_only=True)

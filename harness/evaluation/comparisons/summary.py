@@ -8,6 +8,7 @@ import pandas as pd
 from harness.evaluation.columns import MEANS
 from harness.evaluation.comparisons.comparison import mean_interval, rate_cells
 from harness.evaluation.people import of_people
+from harness.evaluation.severity.closeness import CRITERIA
 from harness.evaluation.tables import table_of, typed
 
 
@@ -60,4 +61,29 @@ def _summary_row(arm: str, persona: str, seed: int, games: pd.DataFrame) -> dict
             if "person" in MEANS[name].whose
         },
         **rate_cells("near_miss_rate", near_misses.sum(), len(near_misses)),
+        **{f"near_misses_by_{each.name}": played[f"near_miss_{each.name}"].sum(min_count=1) for each in CRITERIA},
+        **_harm(played),
+        **_severity(played),
+    }
+
+
+def _severity(played: pd.DataFrame) -> dict[str, object]:
+    """The columns of the collisions' severity."""
+    delta_v_mps = played[["ego_delta_v_mps", "other_delta_v_mps"]].max(axis=1)
+    return {
+        "closing_speed_mps": played["closing_speed_mps"].mean(),
+        "delta_v_mps": delta_v_mps.mean(),
+        "max_delta_v_mps": delta_v_mps.max(),
+        **{name: played[name].mean() for name in ("mais3_risk_low", "mais3_risk_high")},
+    }
+
+
+def _harm(played: pd.DataFrame) -> dict[str, object]:
+    """The columns of harm to others than the ego."""
+    marks = played["harm_to_others"].dropna()
+    return {
+        "person_failures": played["person_failed"].sum(min_count=1),
+        "bystander_failures": played["bystander_failed"].sum(min_count=1),
+        **rate_cells("harm_to_others_rate", marks.sum(), len(marks)),
+        "follower_max_deceleration_mps2": played["follower_max_deceleration_mps2"].mean(),
     }

@@ -144,3 +144,36 @@ def post_encroachment_s(
                 if box_distance(a, other) <= 0.0:
                     least = abs(t - u)
     return least * step_s if least <= most else inf
+
+
+@compiled
+def comes_to_touch(
+    boxes: Box, present: BoolArray, judged: BoolArray, partners: BoolArray, on_foot: BoolArray
+) -> BoolArray:
+    """[B] which of the judged bodies come to touch a partner that they did not touch one step before.
+
+    Boxes and present [T, B]; judged, partners and on_foot [B]. Bodies that touch when the second of them appears do not
+    count until they were apart, and two bodies on foot never do.
+    """
+    found = np.zeros(len(judged), dtype=np.bool_)
+    for a, b in np.ndindex(len(judged), len(judged)):
+        if a == b or found[a] or not judged[a] or not partners[b] or (on_foot[a] and on_foot[b]):
+            continue
+        apart = False
+        for t in range(len(present)):
+            if not (present[t, a] and present[t, b]):
+                apart = False
+                continue
+            own = Box(
+                boxes.x_m[t, a], boxes.y_m[t, a], boxes.heading_rad[t, a], boxes.length_m[t, a], boxes.width_m[t, a]
+            )
+            other = Box(
+                boxes.x_m[t, b], boxes.y_m[t, b], boxes.heading_rad[t, b], boxes.length_m[t, b], boxes.width_m[t, b]
+            )
+            reach_m = 0.5 * (hypot(own.length_m, own.width_m) + hypot(other.length_m, other.width_m))
+            touch = hypot(own.x_m - other.x_m, own.y_m - other.y_m) <= reach_m and box_distance(own, other) <= 0.0
+            if touch and apart:
+                found[a] = True
+                break
+            apart = not touch
+    return found

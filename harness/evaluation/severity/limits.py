@@ -12,7 +12,8 @@ CONFLICT_PET_S = 1.0
 """A post-encroachment time up to this is a conflict. Peesapati, Hunter and Rodgers 2013 ("Evaluation of
 postencroachment time as surrogate for opposing left-turn crashes"): this threshold correlates best with crashes."""
 CONFLICT_HEADWAY_S = 0.5
-"""A time headway below this is a conflict. Our own: half of the least time gap of UN Regulation No. 157 (5.2.3.3)."""
+"""A time headway up to this is a conflict, unless the gap opens. Our own: half of the least time gap of UN Regulation
+No. 157 (5.2.3.3)."""
 SHORT_HEADWAY_S = 1.0
 """UN Regulation No. 157 (5.2.3.3): the shortest time gap at any speed, here as time headway."""
 LONGEST_PET_S = 5.0

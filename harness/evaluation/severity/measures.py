@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from harness.evaluation.column import MAYBE, TEXT
 from harness.evaluation.metrics import Drive, finite, metric
-from harness.evaluation.severity import contact
+from harness.evaluation.severity import closeness, contact
 from harness.evaluation.severity import limits as at
-from harness.game.arrays import BoolArray, FloatArray
+from harness.evaluation.severity.closeness import boxes_of, headways, least_pet_s, least_share, steps_of
+from harness.evaluation.severity.impact import impact_of
+from harness.game.arrays import FloatArray
 from harness.game.bicycle import GRAVITY_MPS2
-from harness.game.geometry import Box
 from harness.game.outcome import Outcome
-from harness.game.quantities import SIGHT_M
 
 CONTACT, RAIL, TIMEOUT = 300.0, 200.0, 100.0
 """What `severity` adds up from, in games with such an end."""
@@ -26,43 +24,14 @@ _SHELBY = f"Shelby 2011, Delta-V as a measure of traffic conflict severity ({_CR
 _MINDERHOUD = "Minderhoud and Bovy 2001, Extended time-to-collision measures for road traffic safety assessment"
 
 
-@dataclass(frozen=True, kw_only=True)
-class Impact:
-    """A contact of two bodies at the end of a game; None of everything without one."""
-
-    closing_mps: float | None = None
-    own_delta_v_mps: float | None = None
-    """Change of the player's velocity, if both move on as one."""
-    other_delta_v_mps: float | None = None
-    side: str | None = None
-
-
-def impact_of(drive: Drive) -> Impact:
-    """The contact that ends a drive, with the body that is nearest then."""
-    game, player, last = drive.game, drive.player, drive.game.last_step(drive.player)
-    if drive.outcome is not Outcome.COLLISION or last is None or (other := game.nearest(last, player)) is None:
-        return Impact()
-    relative = game.velocity_mps(last, other) - game.velocity_mps(last, player)
-    closing_mps = float(np.hypot(*relative))
-    own_kg, other_kg = (at.mass_kg(game.body_kinds[body].vehicle_class) for body in (player, other))
-    if game.names[other] in game.obstacles:
-        other_kg = math.inf
-    angle_rad = contact.impact_angle_rad(game.box(last, player), game.box(last, other), *relative.tolist())
-    return Impact(
-        closing_mps=closing_mps,
-        own_delta_v_mps=closing_mps / (1.0 + own_kg / other_kg),
-        other_delta_v_mps=closing_mps / (1.0 + other_kg / own_kg),
-        side=side_of(angle_rad),
-    )
-
-
 @metric(
     "game",
     meaning="At a contact of the ego with a road user: length of the difference of the two velocities, |v - v_other|.",
     source="Brach and Brach 2011, Vehicle accident analysis and reconstruction methods: closing velocity",
 )
 def closing_speed_mps(drive: Drive) -> float | None:
-    return impact_of(drive).closing_mps
+    impact = impact_of(drive.game, drive.player)
+    return impact.closing_mps if impact is not None else None
 
 
 @metric(
@@ -73,7 +42,8 @@ def closing_speed_mps(drive: Drive) -> float | None:
     source=_SHELBY,
 )
 def ego_delta_v_mps(drive: Drive) -> float | None:
-    return impact_of(drive).own_delta_v_mps
+    impact = impact_of(drive.game, drive.player)
+    return impact.own.delta_v_mps if impact is not None else None
 
 
 @metric(
@@ -82,7 +52,8 @@ def ego_delta_v_mps(drive: Drive) -> float | None:
     source=_SHELBY,
 )
 def other_delta_v_mps(drive: Drive) -> float | None:
-    return impact_of(drive).other_delta_v_mps
+    impact = impact_of(drive.game, drive.player)
+    return impact.other.delta_v_mps if impact is not None else None
 
 
 @metric(
@@ -92,67 +63,23 @@ def other_delta_v_mps(drive: Drive) -> float | None:
     "the two surfaces that met, within 45 degrees.",
 )
 def impact_side(drive: Drive) -> str | None:
-    return impact_of(drive).side
+    impact = impact_of(drive.game, drive.player)
+    return impact.own.side if impact is not None else None
 
 
 # --- how close it came -----------------------------------------------------------------------------------------------
 
 
 @lru_cache(maxsize=1)
-def headways_s(drive: Drive) -> FloatArray:
-    """[N] time headway in each step of the drive; inf without a road user ahead that goes the same way."""
-    q, player, world = drive.game.quantities, drive.player, drive.game.world
-    path = q.on_path
-    turned = q.bodies.heading_rad - q.state.heading_rad[:, player, None]
-    ahead, left = path.ahead_m[:, player], path.left_m[:, player]
-    in_way = np.abs(left) < path.half_width_m[:, player] + 0.5 * world.width_m[player]
-    leads = q.visible[:, player] & in_way & (ahead > 0.0) & (ahead < SIGHT_M)
-    leads &= np.cos(turned) > math.cos(at.LEADER_TURNED_RAD)
-    gap = np.maximum(ahead - path.half_length_m[:, player] - 0.5 * world.length_m[player], 0.0)
-    nearest = np.where(leads, gap, np.inf).min(-1)
-    return np.asarray((nearest / np.maximum(q.state.speed_mps[:, player], 0.1))[_steps(drive)])
-
-
-@lru_cache(maxsize=1)
 def needed_mps2(drive: Drive) -> FloatArray:
     """[N] the braking that is needed in each step of the drive."""
     game, player = drive.game, drive.player
-    speeds = game.bodies.speed_mps[_steps(drive)]
+    speeds = game.bodies.speed_mps[steps_of(game, player)]
     friction = float(game.quantities.state.friction[0])
     most = min(float(game.world.actuators.max_braking_mps2[player]), friction * GRAVITY_MPS2)
-    own, others, among = _boxes(drive)
+    own, others, among = boxes_of(game, player)
     own_speed = np.ascontiguousarray(speeds[:, player])
     return contact.needed_braking_mps2(own, own_speed, others, speeds, among, most, at.NEEDED_WITHIN_S)
-
-
-@lru_cache(maxsize=1)
-def least_pet_s(drive: Drive) -> float:
-    """Least post-encroachment time; inf without one."""
-    most = round(at.LONGEST_PET_S / drive.step_s)
-    return float(contact.post_encroachment_s(*_boxes(drive), at.CROSSING_RAD, drive.step_s, most))
-
-
-def least_share(drive: Drive) -> float:
-    """The least of the measures of closeness, each over its limit; inf without any."""
-    ttc_s, headway_s = (min(each, default=math.inf) for each in (drive.of("time_to_collision_s"), headways_s(drive)))
-    return min(ttc_s / at.CONFLICT_TTC_S, least_pet_s(drive) / at.CONFLICT_PET_S, headway_s / at.CONFLICT_HEADWAY_S)
-
-
-def _steps(drive: Drive) -> BoolArray:
-    """[T]"""
-    drove = drive.game.drove[:, drive.player].copy()
-    drove[0] = False
-    return drove
-
-
-def _boxes(drive: Drive) -> tuple[Box, Box, BoolArray]:
-    """The player's boxes [N], all bodies' [N, B], and which of those are others that are there [N, B]."""
-    bodies, steps = drive.game.bodies, _steps(drive)
-    others = Box(*(getattr(bodies, name)[steps] for name in Box._fields))
-    own = Box(*(np.ascontiguousarray(each[:, drive.player]) for each in others))
-    among = bodies.present[steps].copy()
-    among[:, drive.player] = False
-    return own, others, among
 
 
 @metric(
@@ -162,7 +89,7 @@ def _boxes(drive: Drive) -> tuple[Box, Box, BoolArray]:
     source=f"ISO 34502 and {_CRIME}: THW, with its lanes replaced by the width of the box",
 )
 def min_time_headway_s(drive: Drive) -> float | None:
-    return finite(headways_s(drive), np.min)
+    return finite(headways(drive.game, drive.player).time_s, np.min)
 
 
 @metric(
@@ -173,7 +100,7 @@ def min_time_headway_s(drive: Drive) -> float | None:
     source=f"Allen, Shin and Cooper 1978 ({_CRIME}: PET); angle and limit: FHWA-HRT-08-051",
 )
 def min_post_encroachment_time_s(drive: Drive) -> float | None:
-    return finite(np.array([least_pet_s(drive)]), np.min)
+    return finite(np.array([least_pet_s(drive.game, drive.player)]), np.min)
 
 
 @metric(
@@ -223,18 +150,50 @@ def time_integrated_ttc_s2(drive: Drive) -> float:
     source="UN Regulation No. 157, 5.2.3.3: the shortest time gap",
 )
 def time_headway_below_1_s(drive: Drive) -> float:
-    return float(np.count_nonzero(headways_s(drive) < at.SHORT_HEADWAY_S)) * drive.step_s
+    return float(np.count_nonzero(headways(drive.game, drive.player).time_s < at.SHORT_HEADWAY_S)) * drive.step_s
 
 
 @metric(
     "game",
     dtype=MAYBE,
-    meaning="1 if the ego touched no road user and came as close as one of: time to collision at most "
-    f"{at.CONFLICT_TTC_S:g} s, PET at most {at.CONFLICT_PET_S:g} s, headway below {at.CONFLICT_HEADWAY_S:g} s.",
-    source="FHWA-HRT-08-051 (TTC); Peesapati, Hunter and Rodgers 2013 (PET); headway: our own",
+    meaning="1 if the ego touched no road user and came too close by at least one of the next three criteria.",
 )
 def near_miss(drive: Drive) -> int:
-    return int(drive.outcome is not Outcome.COLLISION and least_share(drive) <= 1.0)
+    return int(any(_comes_too_close(drive, each) for each in closeness.CRITERIA))
+
+
+@metric(
+    "game",
+    dtype=MAYBE,
+    meaning=f"1 if the ego touched no road user and came as close as a {closeness.TTC.bound}.",
+    source="FHWA-HRT-08-051",
+)
+def near_miss_ttc(drive: Drive) -> int:
+    return int(_comes_too_close(drive, closeness.TTC))
+
+
+@metric(
+    "game",
+    dtype=MAYBE,
+    meaning=f"1 if the ego touched no road user and came as close as a {closeness.PET.bound}.",
+    source="Peesapati, Hunter and Rodgers 2013",
+)
+def near_miss_pet(drive: Drive) -> int:
+    return int(_comes_too_close(drive, closeness.PET))
+
+
+@metric(
+    "game",
+    dtype=MAYBE,
+    meaning=f"1 if the ego touched no road user and came as close as a {closeness.HEADWAY.bound} behind a road user "
+    "that is not faster than the ego. Behind a faster one the gap opens.",
+)
+def near_miss_headway(drive: Drive) -> int:
+    return int(_comes_too_close(drive, closeness.HEADWAY))
+
+
+def _comes_too_close(drive: Drive, criterion: closeness.Criterion) -> bool:
+    return drive.outcome is not Outcome.COLLISION and criterion.is_met(drive.game, drive.player)
 
 
 @metric(
@@ -246,19 +205,10 @@ def near_miss(drive: Drive) -> int:
 )
 def severity(drive: Drive) -> float:
     if drive.outcome is Outcome.COLLISION:
-        impact = impact_of(drive)
-        return CONTACT + min(max(impact.own_delta_v_mps or 0.0, impact.other_delta_v_mps or 0.0), _MOST_MPS)
+        impact = impact_of(drive.game, drive.player)
+        return CONTACT + min(impact.delta_v_mps if impact is not None else 0.0, _MOST_MPS)
     if drive.outcome is Outcome.RAIL:
         speeds_mps = drive.of("speed_mps")
         return RAIL + (min(float(speeds_mps[-1]), _MOST_MPS) if len(speeds_mps) else 0.0)
     timeout = TIMEOUT if drive.outcome is Outcome.TIMEOUT else 0.0
-    return 100.0 / (1.0 + least_share(drive)) + timeout
-
-
-def side_of(angle_rad: float) -> str:
-    """The side of a box that is hit from a direction in its frame: 0 from ahead, counter-clockwise."""
-    if abs(angle_rad) <= 0.25 * math.pi:
-        return "front"
-    if abs(angle_rad) >= 0.75 * math.pi:
-        return "rear"
-    return "left" if angle_rad > 0.0 else "right"
+    return 100.0 / (1.0 + least_share(drive.game, drive.player)) + timeout

@@ -14,13 +14,13 @@ from sumolib.net.lane import Lane
 
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray
+from harness.game.follower import FOLLOWER
 from harness.game.initial_state import InitialState
 from harness.game.roles import EGO
 from harness.road.demand.route_file import CAR_SIZE_M, Departure, Motion, RouteFile, VehicleType
 from harness.road.net import network
 from harness.road.scene.scene_files import SceneFiles
 
-FOLLOWER = "follower"
 FOLLOWER_TYPE = "harness_follower"
 HARDEST_BRAKING_MPS2 = 6.0
 """Of the vehicle behind, in the fuzzy safety model of UN R157."""

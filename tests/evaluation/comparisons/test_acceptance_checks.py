@@ -26,7 +26,8 @@ from harness.evaluation.strategies import (
     against_persona,
 )
 from harness.evaluation.tables import table_of
-from harness.reports.acceptance_wording import TITLES
+from harness.reports.acceptance_wording import TITLES, sentence
+from harness.reports.numbers import NO_SPACE
 from tests.support.game_tables import arm, table
 
 RETRAINED = RetrainedEgo(against="speedy")
@@ -98,7 +99,12 @@ def test_judged_ego__is_that_of_the_last_round_that_was_played() -> None:
 
 
 RUN = evidence({RETRAINED_VS: hundred(0)})
-NEAR_MISSES = replace(RUN, summary=summarise(RUN.episodes.assign(near_miss=hundred(95))))
+CLOSE = RUN.episodes.assign(near_miss=hundred(95), near_miss_ttc=hundred(90), near_miss_pet=0, near_miss_headway=0)
+CLOSE.loc[90:94, "near_miss_headway"] = 1
+NEAR_MISSES = replace(RUN, summary=summarise(CLOSE))
+HARMED = evidence({NAIVE_VS: hundred(0), RETRAINED_VS: hundred(0)})
+HARM = HARMED.episodes.assign(person_failed=hundred(2) + hundred(22), bystander_failed=0)
+HARMED = replace(HARMED, summary=summarise(HARM.assign(harm_to_others=HARM["person_failed"])))
 FORGOTTEN = evidence({NAIVE_ALONE: hundred(0), RETRAINED_VS: hundred(0), ALONE: hundred(20)})
 SLOW = evidence({NAIVE_VS: hundred(0), RETRAINED_VS: hundred(0)}, {NAIVE_VS: 13.5, RETRAINED_VS: 12.0})
 PAIR = {"role": "ego", "ego": "retrained_speedy", "non_ego": "speedy", "persona": "speedy", "seed": 1}
@@ -118,6 +124,7 @@ UNFAILING = replace(RUN, preventability=pd.DataFrame(columns=["arm", "seed", "dr
         (RUN, "failure_rate", (0.03, 0.04), 0.0, 0.0362, 100),  # 0 of 100 shows no less than 3.6 %
         (JUDGED, "failure_rate", (0.1, 0.14), 0.07, 0.1389, 100),
         (NEAR_MISSES, "near_miss_rate", (0.5, 0.99), 0.95, 0.9836, 100),
+        (HARMED, "harm_to_others_rate", (0.3, 0.32), 0.22, 0.3139, 100),
         (FORGOTTEN, "failure_rate_alone", (0.25, 0.3), 0.2, 0.2918, 100),
         (SLOW, "speed_loss_mps", (1.0, 2.0), 1.5, 1.5, 100),
         (GAPS, "gap_share", (0.12, 0.15), 0.1, 0.15, 50),
@@ -133,3 +140,22 @@ def test_bound__is_kept_by_the_end_of_the_interval(
     assert {(check.value, check.games) for check in checks} == {(value, games)}
     assert checks[0].limit == pytest.approx(limit, abs=1e-4)
     assert (checks[0].arm == ALONE.name) == (name == "failure_rate_alone")
+
+
+def test_near_misses__are_told_by_criterion() -> None:
+    (check,) = judge({"near_miss_rate": 0.5}, "last", ["speedy"], [1], NEAR_MISSES)
+    assert sentence(check).replace(NO_SPACE, " ") == (
+        "95 % in 100 games of retrained_vs_speedy; with 95 % confidence at most 98.4 %; allowed: 50 %; 90 by time to "
+        "collision of at most 1.5 s, 5 by time headway of at most 0.5 s"
+    )
+
+
+def test_harm_to_others__is_told_beside_that_of_the_naive_ego() -> None:
+    (check,) = judge({"harm_to_others_rate": 0.1}, "last", ["speedy"], [1], HARMED)
+    assert check.detail == (
+        "a person fails in 22 of 100 games beside this ego, and in 2 of 100 beside the naive ego; "
+        "a bystander fails in 0 of 100 games beside this ego, and in 0 of 100 beside the naive ego"
+    )
+    (check,) = judge({"harm_to_others_rate": 0.1}, "naive", ["speedy"], [1], HARMED)
+    assert check.value == 0.02
+    assert "naive" not in check.detail

@@ -18,8 +18,9 @@ RQ2 = Question(question="RQ2", persona="speedy", seed=1, baseline="naive_vs_spee
 p_value_lists = st.lists(st.floats(0, 1) | st.just(math.nan), max_size=12)
 
 
-def games(arm, failed, speed=None, seed=1, first_episode=0):
-    """Games of one arm; None is an empty cell."""
+def games(arm, failed, speed=None, seed=1, first_episode=0, person=None, braking=None):
+    """Games of one arm; None is an empty cell. `person` and `braking`: failures of people, and the follower's strongest
+    braking."""
     count = len(failed)
     return pd.DataFrame(
         {
@@ -29,6 +30,9 @@ def games(arm, failed, speed=None, seed=1, first_episode=0):
             "ego_outcome": ["collision" if cell else "goal" for cell in failed],
             "ego_failed": pd.array(failed, dtype="Int64"),
             "ego_mean_speed_mps": np.array([20.0] * count if speed is None else speed, dtype=float),
+            "person_failed": pd.array([None] * count if person is None else person, dtype="Int64"),
+            "bystander_failed": pd.array([None] * count, dtype="Int64"),
+            "follower_max_deceleration_mps2": np.array([np.nan] * count if braking is None else braking, dtype=float),
             "error": "",
         }
     )
@@ -86,9 +90,14 @@ def test_compare__worse_is_positive_for_rq1_and_better_is_positive_for_rq2():
         ("RQ1", "mean_speed"),
         ("RQ2", "failure"),
         ("RQ2", "mean_speed"),
+        ("RQ2", "person_failure"),
+        ("RQ2", "bystander_failure"),
+        ("RQ2", "follower_braking"),
     ]
-    assert table["mean_difference"].tolist() == pytest.approx([0.6, 4.0, 0.6, 4.0])
-    assert table["rejects_h0"].all()
+    asked = table[:4]
+    assert asked["mean_difference"].tolist() == pytest.approx([0.6, 4.0, 0.6, 4.0])
+    assert asked["rejects_h0"].all()
+    assert (table["verdict"][4:] == "not enough pairs").all()
 
 
 def test_compare__pairs_with_an_error_an_empty_value_or_one_side_only_are_left_out_and_counted():
@@ -194,6 +203,25 @@ def test_compare__holm_is_over_all_planned_questions_whatever_comes_of_them():
     assert (none["verdict"], none["planned_tests"]) == ("no difference", 4)
     assert math.isnan(none["p_holm"])
     assert set(table["about"]) == {"this trained pair"}
+
+
+def test_compare__harm_to_others_is_what_grows_and_a_family_of_its_own():
+    # of 100 persons 2 fail beside the naive ego, and 22 beside the retrained one: 20 pairs differ, all to the worse
+    naive = games(RQ2.baseline, [1] * 30 + [0] * 70, person=[1] * 2 + [0] * 98, braking=[2.0, np.nan] * 50)
+    retrained = games(RQ2.treatment, [0] * 100, person=[1] * 22 + [0] * 78, braking=[3.0, 1.0] * 50)
+    table = compare([RQ2], pd.concat([naive, retrained]), 0.01).set_index("metric")
+    person, braking, failure = (table.loc[name] for name in ("person_failure", "follower_braking", "failure"))
+    assert (person["pairs"], person["mean_difference"]) == (100, pytest.approx(0.2))
+    assert person["mcnemar_p"] == pytest.approx(0.5**20)
+    # mean 0.2, variance (20 * 0.8**2 + 80 * 0.2**2) / 99 = 16 / 99, t = 0.2 / sqrt(16 / 9900) = 4.975
+    assert person["t"] == pytest.approx(0.2 / math.sqrt(16 / 9900))
+    assert person["verdict"] == "significant"
+    # one test of each family: Holm's correction changes neither
+    assert (person["p_holm"], failure["p_holm"]) == (person["p_value"], failure["p_value"])
+    # games without a follower are left out; where it is, it brakes harder by 1 m/s2 each time
+    assert (braking["pairs"], braking["pairs_left_out"], braking["mean_difference"]) == (50, 50, 1.0)
+    assert braking["verdict"] == "no t statistic: all differences equal"
+    assert math.isnan(braking["mcnemar_p"])
 
 
 def test_compare__refuses_two_games_of_one_episode():

@@ -45,6 +45,14 @@ def test_failures__without_the_same_scene_there_are_rates_and_no_test():
     assert verdicts(failing(30), failing(20), same_scene=False)["failures"] == UNKNOWN
 
 
+def test_harm__that_a_new_ego_leaves_to_others_is_worse():
+    before, after = (failing(0).assign(person_failed=[1] * count + [0] * (100 - count)) for count in (2, 22))
+    found = verdicts(before, after)
+    assert found["failures of people without the ego"] == WORSE
+    assert found["failures"] == EQUAL
+    assert "failures of bystanders without the ego" not in found  # nobody was there
+
+
 def test_speed__a_small_difference_is_not_relevant_however_certain():
     assert verdicts(failing(0), failing(0, speed=13.1))["average speed"] == NO_RELEVANT_DIFFERENCE
 

@@ -1,0 +1,114 @@
+"""How close the judged player comes to other road users, and the criteria of a near miss."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from harness.evaluation.recorded_game import RecordedGame
+from harness.evaluation.severity import contact
+from harness.evaluation.severity import limits as at
+from harness.game.arrays import BoolArray, FloatArray
+from harness.game.geometry import Box
+from harness.game.quantities import SIGHT_M
+
+
+class Headways(NamedTuple):
+    """Of the nearest road user ahead that goes the same way, in each step in which a player drives [N]."""
+
+    time_s: FloatArray
+    """The time headway; inf without such a road user."""
+    opens: BoolArray
+    """Whether it is faster than the player along the player's heading: the gap opens."""
+
+
+@lru_cache(maxsize=1)
+def headways(game: RecordedGame, player: int) -> Headways:
+    """The headways of a player."""
+    q, world = game.quantities, game.world
+    path, speed_mps = q.on_path, q.state.speed_mps[:, player]
+    turned = q.bodies.heading_rad - q.state.heading_rad[:, player, None]
+    ahead, left = path.ahead_m[:, player], path.left_m[:, player]
+    in_way = np.abs(left) < path.half_width_m[:, player] + 0.5 * world.width_m[player]
+    leads = q.visible[:, player] & in_way & (ahead > 0.0) & (ahead < SIGHT_M)
+    leads &= np.cos(turned) > math.cos(at.LEADER_TURNED_RAD)
+    gap = np.maximum(ahead - path.half_length_m[:, player] - 0.5 * world.length_m[player], 0.0)
+    gap = np.where(leads, gap, np.inf)
+    nearest = gap.argmin(-1)[:, None]
+    along_mps = np.take_along_axis(q.bodies.speed_mps * np.cos(turned), nearest, -1)[:, 0]
+    time_s = gap.min(-1) / np.maximum(speed_mps, 0.1)
+    steps = steps_of(game, player)
+    return Headways(time_s[steps], (along_mps > speed_mps)[steps])
+
+
+@lru_cache(maxsize=1)
+def least_pet_s(game: RecordedGame, player: int) -> float:
+    """Least post-encroachment time; inf without one."""
+    step_s = game.world.step_s
+    most = round(at.LONGEST_PET_S / step_s)
+    return float(contact.post_encroachment_s(*boxes_of(game, player), at.CROSSING_RAD, step_s, most))
+
+
+def _least_ttc_s(game: RecordedGame, player: int) -> float:
+    return min(game.while_driving(game.quantities.time_to_collision_s, player), default=math.inf)
+
+
+def _least_headway_s(game: RecordedGame, player: int) -> float:
+    time_s, opens = headways(game, player)
+    return min(time_s[~opens], default=math.inf)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Criterion:
+    """A measure of closeness, and the value up to which a game without contact is a near miss."""
+
+    name: str
+    """As it ends the columns `near_miss_...` of episodes.csv and `near_misses_by_...` of summary.csv."""
+    words: str
+    """The measure, after "by"."""
+    limit_s: float
+    least_s: Callable[[RecordedGame, int], float]
+    """The least value of a player in a game; inf without one."""
+
+    @property
+    def bound(self) -> str:
+        """The measure with its limit."""
+        return f"{self.words} of at most {self.limit_s:g} s"
+
+    def is_met(self, game: RecordedGame, player: int) -> bool:
+        """Whether the player comes so close."""
+        return self.least_s(game, player) <= self.limit_s
+
+
+TTC = Criterion(name="ttc", words="time to collision", limit_s=at.CONFLICT_TTC_S, least_s=_least_ttc_s)
+PET = Criterion(name="pet", words="post-encroachment time", limit_s=at.CONFLICT_PET_S, least_s=least_pet_s)
+HEADWAY = Criterion(name="headway", words="time headway", limit_s=at.CONFLICT_HEADWAY_S, least_s=_least_headway_s)
+CRITERIA = (TTC, PET, HEADWAY)
+"""A game without contact that meets one of them is a near miss; it may meet several."""
+
+
+def least_share(game: RecordedGame, player: int) -> float:
+    """The least of the measures of closeness, each over its limit; inf without any."""
+    return min(each.least_s(game, player) / each.limit_s for each in CRITERIA)
+
+
+def steps_of(game: RecordedGame, player: int) -> BoolArray:
+    """[T] the steps in which the player drove, without the start."""
+    drove = game.drove[:, player].copy()
+    drove[0] = False
+    return drove
+
+
+def boxes_of(game: RecordedGame, player: int) -> tuple[Box, Box, BoolArray]:
+    """The player's boxes [N], all bodies' [N, B], and which of those are others that are there [N, B]."""
+    bodies, steps = game.bodies, steps_of(game, player)
+    others = Box(*(getattr(bodies, name)[steps] for name in Box._fields))
+    own = Box(*(np.ascontiguousarray(each[:, player]) for each in others))
+    among = bodies.present[steps].copy()
+    among[:, player] = False
+    return own, others, among

@@ -1,0 +1,44 @@
+"""How severe the collisions of an ego are, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from harness.reports.numbers import NO_SPACE, number, percent
+from harness.reports.run_tables import Row
+
+SMALL_DELTA_V_MPS = 3.0
+"""Below this change of velocity a collision is called small. Our own: just above 10 km/h."""
+_RISK = "the probability of a serious injury (MAIS3+)"
+
+
+def severity_clause(ego: str, rows: Sequence[Row]) -> str:
+    """Number, delta-v and risk of injury of the collisions of an ego ("naive ego"), from the rows of summary.csv of its
+    arm, one for each training seed; empty without a collision."""
+    rows = [row for row in rows if row["collisions"] and np.isfinite(row["max_delta_v_mps"])]
+    if not rows:
+        return ""
+    counts = [int(row["collisions"]) for row in rows]
+    collisions, most_mps = sum(counts), max(row["max_delta_v_mps"] for row in rows)
+    which = f"all {collisions:,} collisions" if collisions > 1 else "the only collision"
+    have = "have" if collisions > 1 else "has"
+    if most_mps < SMALL_DELTA_V_MPS:
+        words = f"{which} of the {ego} {have} a delta-v below {SMALL_DELTA_V_MPS:g}{NO_SPACE}m/s"
+    else:
+        mean_mps = np.average([row["delta_v_mps"] for row in rows], weights=counts)
+        means = f"{number(mean_mps, 1)}{NO_SPACE}m/s on average, " if collisions > 1 else ""
+        words = f"{which} of the {ego}: delta-v {means}at most {number(most_mps, 1)}{NO_SPACE}m/s"
+    return f"{words}{_risk(rows)}"
+
+
+def _risk(rows: Sequence[Row]) -> str:
+    known = [row for row in rows if np.isfinite(row["mais3_risk_high"])]
+    if not known:
+        return ""
+    counts = [int(row["collisions"]) for row in known]
+    low, high = (np.average([row[f"mais3_risk_{end}"] for row in known], weights=counts) for end in ("low", "high"))
+    if low > 0.0:
+        return f"; {_RISK} is {percent(low)} to {percent(high)} (bounds of the mean)"
+    return f"; {_RISK} is at most {percent(high)}"
