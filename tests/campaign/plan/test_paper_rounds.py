@@ -142,11 +142,15 @@ def test_keys__do_not_depend_on_which_other_personas_there_are(tmp_path: Path, p
     assert turned == more
 
 
-def test_keys__do_not_depend_on_which_other_seeds_there_are(tmp_path: Path) -> None:
+def test_keys__do_not_depend_on_seeds_after_the_first(tmp_path: Path) -> None:
+    """The starts of all arms are drawn from the first seed; trainings depend on their own seed alone."""
     _, keys = planned(tmp_path, seeds=[3])
-    _, more = planned(tmp_path, seeds=[1, 3])
+    _, more = planned(tmp_path, seeds=[3, 1])
     assert {name: more[name] for name in keys} == keys
     assert len(set(more.values())) == len(more)
+    _, after_another = planned(tmp_path, seeds=[1, 3])
+    assert after_another["naive-seed3"] == keys["naive-seed3"]
+    assert after_another["naive_vs_sumo-seed3"] != keys["naive_vs_sumo-seed3"]
 
 
 def test_keys__a_persona_changes_what_it_takes_part_in(tmp_path: Path, personas: list[str]) -> None:
