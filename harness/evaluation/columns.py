@@ -9,10 +9,10 @@ from dataclasses import replace
 from harness.evaluation.attribution_columns import ATTRIBUTION, UNDECIDED
 from harness.evaluation.column import COUNT, FLAG, MAYBE, NUMBER, OF_METRIC, P_VALUE, POINTS, SHARE, TEXT, Column
 from harness.evaluation.measured_game import METRICS_OF_CONDUCT, METRICS_OF_GAMES, METRICS_OF_PLAYERS
+from harness.evaluation.over_trainings_columns import OVER_TRAININGS
 from harness.evaluation.severity.closeness import CRITERIA
 
 _EXACT, _T = "95 % Clopper-Pearson interval", "95 % t interval"
-_CROSSED = "95 % interval over trainings and starts (a two-level bootstrap)"
 _PAPER = "the paper, section 4.2"
 ARM = Column("arm", TEXT, "The name of the arm, such as naive_vs_speedy.")
 PERSONA = Column("persona", TEXT, "The persona of the non-ego; of an arm with one.")
@@ -31,7 +31,7 @@ _P = Column("p_value", NUMBER, "Of the paired one-tailed t-test.", unit=P_VALUE,
 _P_HOLM = Column(
     "p_holm", NUMBER, "Corrected for all rows of the table.", unit=P_VALUE, label="p after Holm", source="Holm 1979"
 )
-_P_PLANNED = replace(_P_HOLM, meaning="Corrected for all planned tests; empty where there is no or a secondary test.")
+_P_PLANNED = replace(_P_HOLM, meaning="Corrected for all planned tests; of harm for those of harm; else empty.")
 _PLANNED = Column("planned_tests", MAYBE, "The tests that the correction is over; empty: the test is secondary.")
 _ABOUT = Column("about", TEXT, "What the verdict holds for: `this trained pair`, or `trainings like this`.")
 _QUESTION = Column("question", TEXT, "RQ1: does the persona cause failures; RQ2: does retraining reduce them.")
@@ -39,8 +39,6 @@ _REASON = Column("reason", TEXT, "Why the question is not answered; else empty."
 _VERDICT = Column("verdict", TEXT, "What the row says about its question.")
 _FAILED = "Share of the games in which the ego failed."
 _FAILURE_RATE = Column("failure_rate", NUMBER, _FAILED, unit=SHARE)
-
-
 _GREATER = "the greater of ego_delta_v_mps and other_delta_v_mps."
 
 
@@ -197,36 +195,13 @@ _TABLES = {
         Column("t", NUMBER, "The t statistic; empty where all differences are equal.", source=_PAPER),
         *(_P, _P_PLANNED, _PLANNED),
         Column("effect_size", NUMBER, "Cohen's d_z: mean over standard deviation.", label="effect size d_z"),
-        Column(
-            "mcnemar_p",
-            NUMBER,
-            "McNemar's exact test of failures, of the ego or others.",
-            unit=P_VALUE,
-            label="McNemar p",
-        ),
+        Column("mcnemar_p", NUMBER, "McNemar's exact test, of shares.", unit=P_VALUE, label="McNemar p"),
         Column("rejects_h0", FLAG, "Whether p_value is below the significance.", label="rejects H0 (p alone)"),
         *(_VERDICT, _ABOUT, _REASON),
     ),
     "over_trainings": (
         *(_QUESTION, PERSONA),
-        Column("trainings", COUNT, "The trainings that are compared: those whose question is answered."),
-        Column("trainings_left_out", COUNT, "The others of the campaign."),
-        Column("starts", MAYBE, "Starts that all of these trainings play in both arms."),
-        Column("starts_left_out", MAYBE, "Starts of which a training has no pair: errored, missing or not measured."),
-        Column(
-            "mean_difference",
-            NUMBER,
-            "Of failures, over trainings and starts; above 0 supports H1.",
-            unit=POINTS,
-            label="mean difference towards H1",
-        ),
-        Column("ci_low", NUMBER, f"The low end of its {_CROSSED}.", unit=POINTS, label="its 95 % low"),
-        Column("ci_high", NUMBER, f"The high end of its {_CROSSED}.", unit=POINTS, label="its 95 % high"),
-        Column("least", NUMBER, "The mean difference of the training with the least.", unit=POINTS),
-        Column("most", NUMBER, "That of the training with the most.", unit=POINTS),
-        Column("standard_error", NUMBER, "Of mean_difference, by the bootstrap.", unit=POINTS, source="Owen 2007"),
-        Column("degrees", NUMBER, "Degrees of freedom of t.", source="Satterthwaite 1946"),
-        Column("t", NUMBER, "mean_difference / standard_error; empty where all differences are equal."),
+        *OVER_TRAININGS,
         replace(_P, meaning="Of the one-tailed t-test over trainings and starts.", source=""),
         *(_P_PLANNED, _PLANNED, _VERDICT, _ABOUT, _REASON),
     ),
