@@ -94,8 +94,8 @@ class Results:
             raise UsageError.of(self.path / _RESULT, "", f"can't be read: {error}", remedy) from None
 
     @property
-    def verdicts(self) -> list[dict[str, str]]:
-        """Persona, question, label and sentence of each verdict."""
+    def verdicts(self) -> list[dict[str, Any]]:
+        """Persona, question, label and sentence of each verdict, what it is about, and the number of planned tests."""
         return list(self.outcome["verdicts"])
 
     @property

@@ -57,7 +57,7 @@ def test_trace__is_the_recording_of_one_game() -> None:
 
 def test_trace__a_published_run_without_traces_is_refused() -> None:
     with pytest.raises(harness.UsageError, match="this folder does not contain the traces"):
-        harness.load(REPOSITORY / "reports" / "merge").trace("naive_vs_speedy", shipped.SEED, 23)
+        harness.load(REPOSITORY / "reports" / "merge").trace("naive_vs_speedy", 21, 23)
 
 
 def test_policies__are_shown_by_their_names_and_shapes(tmp_path: Path) -> None:

@@ -8,7 +8,6 @@ from pathlib import Path
 
 from benchmarks.campaign import TimedStage, makespan_s
 from harness.campaign.execution.worker_pool import cores
-from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage
 from harness.campaign.plan.strategy_stages import training_settings
 from harness.campaign.preflight import OpenCampaign, open_campaign
@@ -31,7 +30,7 @@ def cost_table(campaigns: Sequence[Path], root: Path) -> str:
     core_h = wall_h = 0.0
     for path in campaigns:
         campaign = open_campaign(path, policies_exist=False)  # an earlier step may make them
-        stages = plan(campaign.document, [persona.name for persona in campaign.personas], campaign.tunable)
+        stages = campaign.stages
         seconds = {stage.id: _seconds(campaign, stage, steps_per_s, arm_s) for stage in stages}
         timed = [TimedStage(id=each.id, seed=each.seed, needs=each.needs, seconds=seconds[each.id]) for each in stages]
         trainings = [each for each in stages if isinstance(each, TrainingStage)]

@@ -155,9 +155,9 @@ def main(
     episodes, comparisons = pd.read_csv(run / "episodes.csv"), pd.read_csv(run / "comparisons.csv")
     seeds = sorted(episodes["seed"].unique())
     count = int((episodes["arm"] == "naive_alone").sum() / len(seeds))
-    tables = {}
+    start_seed, tables = int(episodes["seed"].iloc[0]), {}
     for seed in seeds:
-        lawful_payoff, limit_mps = _play_lawful_driver(run, int(seed), count)
+        lawful_payoff, limit_mps = _play_lawful_driver(run, int(seed), start_seed, count)
         tables[seed] = Tables(
             episodes=episodes[episodes["seed"] == seed],
             comparisons=comparisons[comparisons["seed"] == seed],
@@ -178,13 +178,13 @@ def main(
         pd.DataFrame(rows).to_csv(out, index=False)
 
 
-def _play_lawful_driver(run: Path, seed: int, episodes: int) -> tuple[float, float]:
+def _play_lawful_driver(run: Path, seed: int, start_seed: int, episodes: int) -> tuple[float, float]:
     """The mean payoff of SUMO's driver in the speedy driver's place, on its terms, and the speed limit in m/s."""
     scene = open_scene(ROOT / "networks" / "paper_merge")
     careful, speedy = (read_document(ROOT / "personas" / f"{n}.toml", Persona) for n in ("careful", "paper_speedy"))
     naive = LearnedDriver(read_policy(run / "policies" / f"naive-seed{seed}"), careful.decisions == "sampled")
     drivers = (mixture_of(naive, careful), mixture_of(SumoDriver(), speedy))
-    arm = SeatedArm(name="lawful", scene=scene, drivers=drivers, seed=seed)
+    arm = SeatedArm(name="lawful", scene=scene, drivers=drivers, seed=start_seed)
     payoffs = [game.record["non_ego_payoff"] for game in assess(arm, episodes)]
     routes = scene.world.road.routes
     return float(np.mean(payoffs)), float(routes.speed_limit_mps[routes.first_row[1]])

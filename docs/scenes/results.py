@@ -2,7 +2,8 @@
 
     python docs/scenes/results.py reports/left_across reports/roundabout
 
-prints the shares of games in which the ego fails and the person reaches its goal, and the verdicts on failures.
+prints the shares of games in which the ego fails and the person reaches its goal, and the verdicts on failures: for
+each training seed about this trained pair, and in the row "all" about trainings like this.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ def rows_of(run: Path) -> Iterator[list[str]]:
     """A row for each person and training seed of a run folder."""
     summary = read_csv(run / "summary.csv").set_index(["arm", "seed"])
     verdicts = read_csv(run / "comparisons.csv").query("metric == 'failure'")
+    over = run / "over_trainings.csv"
     for (person, seed), questions in verdicts.groupby(["persona", "seed"], sort=False):
         failures = summary["failure_rate"].xs(seed, level="seed")
         arms = ("naive_alone", "naive_vs_sumo", f"naive_vs_{person}", f"retrained_vs_{person}")
@@ -39,6 +41,9 @@ def rows_of(run: Path) -> Iterator[list[str]]:
         goals = _share(summary.loc[(f"{person}_alone", seed), "non_ego_goal_rate"])
         answers = questions.set_index("question")["verdict"]
         yield [run.name, str(person), str(seed), alone, beside, goals, naive, retrained, answers["RQ1"], answers["RQ2"]]
+    for person, questions in read_csv(over).groupby("persona", sort=False) if over.is_file() else ():
+        answers = questions.set_index("question")["verdict"]
+        yield [run.name, str(person), "all", *[""] * 5, answers["RQ1"], answers["RQ2"]]
 
 
 def _share(value: float) -> str:

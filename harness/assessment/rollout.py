@@ -1,7 +1,7 @@
 """Assessment of one arm: its seeded games, one after the other, as records and traces.
 
 SUMO is reloaded for each game with a seed that depends on the episode only: episode k has the same initial state in
-every arm.
+every arm of every training seed.
 """
 
 from __future__ import annotations
@@ -44,6 +44,7 @@ class SeatedArm:
     drivers: tuple[Mixture | None, ...]
     """[P], ego first."""
     seed: int
+    """The seed of the starts, `Campaign.start_seed`: not that of the trainings of the drivers."""
 
     def present_in(self, episode: int) -> list[bool]:
         """[P] which players take part in an episode."""

@@ -21,8 +21,9 @@ from harness.campaign.plan.stages import Stage
 from harness.campaign.plan.strategy_stages import crossplay_name
 from harness.campaign.trained_policies import check_policies, find_policies
 from harness.config.campaign import LEARNED, SUMO, Campaign, DocumentPath, Ego
-from harness.config.persona import Persona, lapsing
+from harness.config.persona import Persona
 from harness.config.toml_reading import Document, read_document
+from harness.config.traits import traits_of
 from harness.drivers.car import car_of
 from harness.drivers.driver_files import sha256_of
 from harness.drivers.external import ExternalDriver, find_driver
@@ -45,6 +46,11 @@ class _NamedByEgo(Document):
     persona: DocumentPath = Ego().persona
 
 
+class _NamedByAttribution(Document):
+    model_config = ConfigDict(extra="ignore")
+    baseline: DocumentPath
+
+
 class _Names(Document):
     """The documents that a campaign names: they are checked even where the rest of it is wrong."""
 
@@ -53,6 +59,7 @@ class _Names(Document):
     personas: list[DocumentPath]
     policies: DocumentPath | None = None
     ego: _NamedByEgo = _NamedByEgo()
+    attribution: _NamedByAttribution | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,6 +72,8 @@ class OpenCampaign:
     scene: OpenScene
     ego_persona: Persona
     personas: tuple[Persona, ...]
+    baseline: Persona | None
+    """The careful person of `[attribution]`; it may be one of the personas."""
     ego_driver: ExternalDriver | None
     """The ego's external driver; None where the ego is learned or driven by SUMO's own models."""
     policies: Path | None
@@ -92,7 +101,12 @@ class OpenCampaign:
     def stages(self) -> list[Stage]:
         """Every stage of its plan, each after those it needs."""
         names = [persona.name for persona in self.personas]
-        return plan(self.document, names, self.tunable, lapsing(self.personas))
+        return plan(self.document, names, self.tunable, traits_of(self.personas, self.baseline))
+
+    @property
+    def people(self) -> dict[str, Persona]:
+        """Every persona that drives as a non-ego, by name: those of the campaign, and the baseline."""
+        return {each.name: each for each in (*self.personas, self.baseline) if each is not None}
 
     def hash_of(self, path: Path) -> str:
         """SHA-256 of one of those files."""
@@ -120,9 +134,12 @@ def open_campaign(
     vehicle_type = ego_driver.vehicle_type if ego_driver is not None else None
     scene = collect(problems, lambda: open_scene(_find_named(file, "scene", named.scene, "networks"), vehicle_type))
     written = [("ego.persona", named.ego.persona), *(("personas", each) for each in named.personas)]
+    if named.attribution is not None:
+        written.append(("attribution.baseline", named.attribution.baseline))
     persona_files: list[Path] = []
     found = [collect(problems, partial(_read_persona, file, key, name, persona_files)) for key, name in written]
     ego_persona, *personas = found
+    baseline = personas.pop() if named.attribution is not None else None
     elsewhere: dict[str, str] = {}
     if ego_driver is not None and scene is not None:
         collect(problems, partial(_note_origin, ego_driver, scene, ego_persona, elsewhere))
@@ -139,22 +156,23 @@ def open_campaign(
             for each in other_egos.values():
                 collect(problems, partial(_note_origin, each, scene, ego_persona, elsewhere))
     policies = collect(problems, lambda: find_policies(file, named.policies, policies_exist))
-    problems += _same_names(file, named.personas, personas)
+    problems += _same_names(file, named.personas, personas, baseline)
     if not problems and scene is not None:
         collect(problems, lambda: check_loads(scene))
     if problems or document is None or scene is None or ego_persona is None:
         raise UsageError(problems)
     read = [each for each in personas if each is not None]
-    tunable = _is_tunable(ego_driver)
+    tunable, traits, names = _is_tunable(ego_driver), traits_of(read, baseline), [persona.name for persona in read]
     check_people(file, document, len(scene.document.non_ego))
-    check_names(file, document, [persona.name for persona in read], tunable, lapsing(read))
+    check_names(file, document, names, tunable, traits)
     files, policy_drivers = list[Path](), dict[str, ExternalDriver]()
     if policies is not None and policies_exist:
         files, policy_drivers = check_policies(
             file,
             document=document,
             ego_persona=ego_persona,
-            personas=read,
+            personas=[*read, *([baseline] if baseline is not None else [])],
+            stages=plan(document, names, tunable, traits),
             folder=policies,
             scene=scene,
             allow_code=allow_code,
@@ -171,6 +189,7 @@ def open_campaign(
         scene=scene,
         ego_persona=ego_persona,
         personas=tuple(read),
+        baseline=baseline,
         ego_driver=ego_driver,
         policies=policies,
         other_egos=other_egos,
@@ -214,12 +233,17 @@ def _relative(campaign_file: Path, path: Path) -> str:
     return Path(os.path.relpath(path.resolve(), campaign_file.resolve().parent)).as_posix()
 
 
-def _same_names(file: Path, written: Sequence[str], personas: Sequence[Persona | None]) -> Iterator[Problem]:
+def _same_names(
+    file: Path, written: Sequence[str], personas: Sequence[Persona | None], baseline: Persona | None
+) -> Iterator[Problem]:
     names = [each.name for each in personas if each is not None]
     for path, persona in zip(written, personas, strict=True):
         if persona is not None and names.count(persona.name) > 1:
             message = f"{path!r}: another persona is called {persona.name!r} too"
             yield Problem(str(file), "personas", message, "give each persona a name of its own")
+        if persona is not None and baseline is not None and persona.name == baseline.name and persona != baseline:
+            message = f"the persona {path!r} is called {persona.name!r} too, and is another one"
+            yield Problem(str(file), "attribution.baseline", message, "give the baseline a name of its own")
 
 
 def _games_at_once(document: Campaign | None, ego_driver: ExternalDriver) -> int:

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
-from harness.campaign.plan.plan import plan
+from harness.campaign.plan.stages import Stage
 from harness.config.campaign import Campaign
 from harness.config.persona import Persona
 from harness.config.toml_reading import nearest
@@ -51,12 +51,14 @@ def check_policies(
     document: Campaign,
     ego_persona: Persona,
     personas: Sequence[Persona],
+    stages: Sequence[Stage],
     folder: Path,
     scene: OpenScene,
     allow_code: bool,
     elsewhere: dict[str, str],
 ) -> tuple[list[Path], dict[str, ExternalDriver]]:
-    """The files of every policy that a campaign reads, and the policies of others by the name of their folder.
+    """The files of every policy that the stages of a campaign read, and the policies of others by the name of their
+    folder. `personas`: every persona that drives as a non-ego.
 
     Raises UsageError for each that is missing or does not fit, and for each that runs code in files without permission
     (`allow_code`). How the games differ in which a policy learned is added to `elsewhere`, by its name.
@@ -66,7 +68,7 @@ def check_policies(
     problems: list[Problem] = []
     files: list[Path] = []
     drivers: dict[str, ExternalDriver] = {}
-    for name in dict.fromkeys(name for stage in plan(document, list(by_name)) for name in stage.reads):
+    for name in dict.fromkeys(name for stage in stages for name in stage.reads):
         place = folder / name / DRIVER
         person = by_name.get(name.rpartition("-seed")[0])
         player = EGO if person is None else NON_EGO

@@ -111,6 +111,7 @@ def check(
 def _check_campaign(file: Path, allow_code: bool, as_json: bool, console: Console) -> None:
     from harness.campaign.execution.repeat_check import varying_drivers
     from harness.campaign.plan.persona_remarks import ego_persona_remarks, persona_remarks
+    from harness.campaign.plan.planned_families import family_lines, family_records, planned_families
     from harness.campaign.preflight import open_campaign
     from harness.config.campaign import LEARNED
     from harness.errors import plain
@@ -122,13 +123,17 @@ def _check_campaign(file: Path, allow_code: bool, as_json: bool, console: Consol
     ego = [] if opened.document.ego.driver == LEARNED else [messages.ego(opened), *notes]
     told = (*varying.items(), *opened.learned_elsewhere.items())
     ego = [plain(each) for each in (*ego, *(f"{driver}: {words}" for driver, words in told))]
-    unsuited = persona_remarks(opened.personas, opened.scene.world, opened.document.training.discount)
+    unsuited = persona_remarks([*opened.people.values()], opened.scene.world, opened.document.training.discount)
     remarks = [*opened.scene.warnings, *unsuited, *ego_persona_remarks(opened.ego_persona), *ego]
     print_plain([f"{file} is in order.", *remarks], console)
+    personas = [each.name for each in opened.personas]
+    planned = planned_families(opened.document, personas, opened.tunable)
     print_plain([messages.work(opened, stages), *messages.stage_lines(stages)], console)
+    print_plain(family_lines(planned), console)
     if as_json:
         checked = {"campaign": opened.document.name, "file": str(file), "in_order": True}
-        print_json({**checked, "remarks": remarks, "stages": messages.stage_records(stages)})
+        listed = {"stages": messages.stage_records(stages), "planned_tests": family_records(planned)}
+        print_json({**checked, "remarks": remarks, **listed})
 
 
 def schema(

@@ -106,6 +106,17 @@ class Assessment(Document):
     """Whether each failure of an ego against a persona is judged: would a reference driver have prevented it?"""
 
 
+class Attribution(Document):
+    """Attribution of failures: which trait of a persona makes the naive ego fail, and how often. The games of
+    `naive_vs_<persona>` are played again with one trait exchanged, for each trait in which the persona differs from the
+    baseline: by the persona without the trait, and by the baseline with this trait alone."""
+
+    baseline: DocumentPath
+    """A careful person: its file, relative to this file, or the name of a shipped persona. It drives in the non-ego's
+    place with the human limits of its document, and is trained as a persona of round 1, once for each seed. It may be a
+    persona of the campaign."""
+
+
 class Competence(Document):
     """What a player has to achieve without the other player before its results count. A question about players of which
     one achieves less is not answered, and a training that made such a player is reported as `did not learn`."""
@@ -170,7 +181,8 @@ class Campaign(Document):
     """Files of the personas that the ego meets, one after the other, relative to this file, or names of shipped
     personas."""
     seeds: list[Seed] = Field([1], min_length=1, max_length=100)
-    """Training seeds. All players are trained and assessed once per seed."""
+    """Training seeds. All players are trained once per seed. All trainings are assessed in the same games: their starts
+    are drawn from the first seed."""
     policies: DocumentPath | None = None
     """Folder of trained policies, with the layout of `policies/` in a run folder. Nothing is trained; every learned
     player is read from this folder."""
@@ -187,6 +199,7 @@ class Campaign(Document):
     rounds: Rounds = Rounds()
     best_response: BestResponseSearch | None = None
     crossplay: CrossPlay | None = None
+    attribution: Attribution | None = None
     competence: Competence = Competence()
     assessment: Assessment = Assessment()
     acceptance: Acceptance | None = None
@@ -241,6 +254,12 @@ class Campaign(Document):
         the first again."""
         populations = {each.name: (each.shares,) for each in self.population}
         return populations | {each.name: tuple({name: 1.0} for name in each.personas) for each in self.crowd}
+
+    @property
+    def start_seed(self) -> int:
+        """The seed of the assessment's starts, the same for all trainings: a seed that is added at the end of `seeds`
+        changes no game of the others."""
+        return self.seeds[0]
 
     @property
     def stops_early(self) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -298,11 +298,6 @@ class Persona(Document):
             reaction=Reaction(**_given(self.reaction)),
             actuator_shares=ActuatorShares(**_given(self.actuators)),
         )
-
-
-def lapsing(personas: Iterable[Persona]) -> list[str]:
-    """The names of the personas whose attention lapses."""
-    return [each.name for each in personas if each.attention is not None]
 
 
 def _given(table: Document | None) -> dict[str, Any]:

@@ -50,8 +50,8 @@ class PinnedPerson(Document):
 
 
 class PinnedGame(Document):
-    """One game. Everything random in it, such as lapses of attention and background traffic, is drawn from `seed` and
-    `episode`, as in the campaign."""
+    """One game. Everything random in it, such as lapses of attention and background traffic, is drawn from `start_seed`
+    and `episode`, as in the campaign."""
 
     format: Literal[1]
     """The format of this document."""
@@ -63,6 +63,8 @@ class PinnedGame(Document):
     """The arm in which the game was found."""
     seed: Seed
     """The training seed of that arm."""
+    start_seed: Seed | None = None
+    """The seed of the starts in that campaign; left out: that of the arm."""
     episode: int = Field(ge=0, le=10**9)
     """The number of the game in that arm."""
     outcome: Literal["collision", "rail", "timeout"]

@@ -6,8 +6,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
+from harness.evaluation.attribution_columns import ATTRIBUTION, UNDECIDED
 from harness.evaluation.column import COUNT, FLAG, MAYBE, NUMBER, OF_METRIC, P_VALUE, POINTS, SHARE, TEXT, Column
 from harness.evaluation.measured_game import METRICS_OF_CONDUCT, METRICS_OF_GAMES, METRICS_OF_PLAYERS
+from harness.evaluation.over_trainings_columns import OVER_TRAININGS
 from harness.evaluation.severity.closeness import CRITERIA
 
 _EXACT, _T = "95 % Clopper-Pearson interval", "95 % t interval"
@@ -15,7 +17,7 @@ _PAPER = "the paper, section 4.2"
 ARM = Column("arm", TEXT, "The name of the arm, such as naive_vs_speedy.")
 PERSONA = Column("persona", TEXT, "The persona of the non-ego; of an arm with one.")
 SEED = Column("seed", COUNT, "The training seed.")
-EPISODE = Column("episode", COUNT, "The game. Equal numbers begin alike in every arm.")
+EPISODE = Column("episode", COUNT, "The game. Equal numbers begin alike in every arm and for every training seed.")
 _GAME = (ARM, PERSONA, SEED, EPISODE)
 _EGO_FAILED = Column("ego_failed", MAYBE, "1 if the ego did not reach its goal, else 0.", source="the paper, section 4")
 _ERROR = Column("error", TEXT, "Why the game could not be played; empty if it was.")
@@ -27,19 +29,16 @@ _PAIRS = (
 )
 _P = Column("p_value", NUMBER, "Of the paired one-tailed t-test.", unit=P_VALUE, label="p", source=_PAPER)
 _P_HOLM = Column(
-    "p_holm",
-    NUMBER,
-    "Corrected for all tests of the table; those of harm are a family of their own.",
-    unit=P_VALUE,
-    label="p after Holm",
-    source="Holm 1979",
+    "p_holm", NUMBER, "Corrected for all rows of the table.", unit=P_VALUE, label="p after Holm", source="Holm 1979"
 )
+_P_PLANNED = replace(_P_HOLM, meaning="Corrected for all planned tests; of harm for those of harm; else empty.")
+_PLANNED = Column("planned_tests", MAYBE, "The tests that the correction is over; empty: the test is secondary.")
+_ABOUT = Column("about", TEXT, "What the verdict holds for: `this trained pair`, or `trainings like this`.")
+_QUESTION = Column("question", TEXT, "RQ1: does the persona cause failures; RQ2: does retraining reduce them.")
 _REASON = Column("reason", TEXT, "Why the question is not answered; else empty.")
 _VERDICT = Column("verdict", TEXT, "What the row says about its question.")
 _FAILED = "Share of the games in which the ego failed."
 _FAILURE_RATE = Column("failure_rate", NUMBER, _FAILED, unit=SHARE)
-
-
 _GREATER = "the greater of ego_delta_v_mps and other_delta_v_mps."
 
 
@@ -176,8 +175,7 @@ _TABLES = {
     ),
     "summary": tuple(_summary()),
     "comparisons": (
-        Column("question", TEXT, "RQ1: does the persona cause failures; RQ2: does retraining reduce them."),
-        *(PERSONA, SEED),
+        *(_QUESTION, PERSONA, SEED),
         Column(
             "metric",
             TEXT,
@@ -195,18 +193,20 @@ _TABLES = {
         Column("ci_low", NUMBER, f"The low end of its {_T}.", unit=OF_METRIC, label="its 95 % low"),
         Column("ci_high", NUMBER, f"The high end of its {_T}.", unit=OF_METRIC, label="its 95 % high"),
         Column("t", NUMBER, "The t statistic; empty where all differences are equal.", source=_PAPER),
-        *(_P, _P_HOLM),
+        *(_P, _P_PLANNED, _PLANNED),
         Column("effect_size", NUMBER, "Cohen's d_z: mean over standard deviation.", label="effect size d_z"),
-        Column(
-            "mcnemar_p",
-            NUMBER,
-            "McNemar's exact test of failures, of the ego or others.",
-            unit=P_VALUE,
-            label="McNemar p",
-        ),
+        Column("mcnemar_p", NUMBER, "McNemar's exact test, of shares.", unit=P_VALUE, label="McNemar p"),
         Column("rejects_h0", FLAG, "Whether p_value is below the significance.", label="rejects H0 (p alone)"),
-        *(_VERDICT, _REASON),
+        *(_VERDICT, _ABOUT, _REASON),
     ),
+    "over_trainings": (
+        *(_QUESTION, PERSONA),
+        *OVER_TRAININGS,
+        replace(_P, meaning="Of the one-tailed t-test over trainings and starts.", source=""),
+        *(_P_PLANNED, _PLANNED, _VERDICT, _ABOUT, _REASON),
+    ),
+    "attribution": (PERSONA, SEED, *ATTRIBUTION, _REASON),
+    "undecided": (ARM, PERSONA, SEED, *UNDECIDED),
     "training": (
         Column("stage", TEXT, "The name of the training."),
         *(PERSONA, SEED),

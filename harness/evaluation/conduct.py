@@ -149,5 +149,15 @@ def longest_lapse_s(drive: Drive) -> float | None:
     return max(lengths) * drive.step_s if lengths else None
 
 
+@metric(
+    "conduct",
+    meaning="Time at the end of the player's game in which it made no decision, because its attention had lapsed.",
+)
+def undecided_at_end_s(drive: Drive) -> float | None:
+    decided = np.flatnonzero(~_lapsed(drive).astype(bool))
+    steps = len(_lapsed(drive))
+    return (steps - 1 - int(decided[-1]) if len(decided) else steps) * drive.step_s if steps else None
+
+
 def _lapsed(drive: Drive) -> FloatArray:
     return drive.game.while_driving(drive.game.quantities.state.lapsed, drive.player)

@@ -14,6 +14,7 @@ from scipy.stats import chi2
 from scipy.stats.contingency import odds_ratio
 
 from harness.evaluation.strategies import (
+    ATTENTIVE,
     Arm,
     NaiveEgo,
     PersonaNonEgo,
@@ -146,7 +147,7 @@ def realism(
         figures = of_people if player.persona else OF_DRIVERS
         alone = games[games["alone"]]
         rows = [*(_compared(figure, games) for figure in figures), _crashes(alone)]
-        attentive = persona_alone(player.persona, attentive=True)
+        attentive = persona_alone(player.persona, ATTENTIVE)
         if player.name == player.persona and attentive.name in arms:
             with_open_eyes = (conduct["arm"] == attentive.name) & (conduct["seed"] == player.seed)
             rows.append(_crash_odds(alone, _of_person(conduct[with_open_eyes], player.persona)))
@@ -174,12 +175,12 @@ def _players(conduct: pd.DataFrame, arms: Mapping[str, Arm]) -> dict[_Player, pd
 
 def _roles(arms: Iterable[Arm]) -> Iterator[tuple[Arm, str, str]]:
     """Each arm with a player of it: its name in the table, and its persona."""
-    own = [arm for arm in arms if arm.best_response_of is None]
+    own = [arm for arm in arms if arm.best_response_of is None and not arm.is_of_a_trait]
     for arm in own:
         if isinstance(arm.ego, NaiveEgo | RetrainedEgo):
             yield arm, f"{strategy_name(arm.ego)} ego", ""
         person = arm.non_ego
-        if isinstance(person, PersonaNonEgo) and not person.attentive and persona_alone(person.persona) in own:
+        if isinstance(person, PersonaNonEgo) and person.borrowed is None and persona_alone(person.persona) in own:
             yield arm, strategy_name(person), person.persona
 
 

@@ -48,13 +48,22 @@ class SumoNonEgo:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Borrowed:
+    """A trait (`config.traits.TRAITS`) that a person has of another one when it plays."""
+
+    trait: str
+    of: str
+    """The persona that has it; empty: nobody, so that the person is without the trait."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class PersonaNonEgo:
     """The non-ego of a persona, in an odd round; or a population, of which each game has one persona."""
 
     persona: str
     round: int = 1
-    attentive: bool = False
-    """Whether its attention does not lapse: its eyes stay on the road."""
+    borrowed: Borrowed | None = None
+    """The trait that is not its own."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,19 +95,28 @@ class Arm:
         return replace(self, best_response_of=None)
 
     @property
+    def is_of_a_trait(self) -> bool:
+        """Whether an ego meets a person of which one trait is another person's: a question of `[attribution]`, and no
+        person of the campaign."""
+        borrows = isinstance(self.non_ego, PersonaNonEgo) and self.non_ego.borrowed is not None
+        return self.ego is not None and borrows
+
+    @property
     def name(self) -> str:
         """The arm's name in tables and stages."""
         pair = _pair_name(self.ego, self.non_ego)
         return pair if self.best_response_of is None else f"{pair}_{ROLES[self.best_response_of]}_response"
 
 
+ATTENTIVE = Borrowed(trait="attention", of="")
+"""A person without lapses of attention: its eyes stay on the road."""
 NAIVE_ALONE = Arm(ego=NaiveEgo())
 NAIVE_VS_SUMO = Arm(ego=NaiveEgo(), non_ego=SumoNonEgo())
 
 
-def persona_alone(persona: str, *, attentive: bool = False) -> Arm:
+def persona_alone(persona: str, borrowed: Borrowed | None = None) -> Arm:
     """The arm of a persona's non-ego of round 1 without the ego."""
-    return Arm(non_ego=PersonaNonEgo(persona=persona, attentive=attentive))
+    return Arm(non_ego=PersonaNonEgo(persona=persona, borrowed=borrowed))
 
 
 def against_persona(ego: EgoStrategy, persona: str) -> Arm:
@@ -133,10 +151,16 @@ def strategy_name(strategy: Strategy) -> str:
             return driver
         case SumoNonEgo():
             return "sumo"
-        case PersonaNonEgo(persona=persona, round=round_, attentive=attentive):
-            return persona + (f"_round{round_}" if round_ > 1 else "") + ("_attentive" if attentive else "")
+        case PersonaNonEgo(persona=persona, round=round_, borrowed=borrowed):
+            return persona + (f"_round{round_}" if round_ > 1 else "") + _borrowed_name(borrowed)
         case BestResponse(arm=arm, start=start):
             return f"{arm.name}{start}"
+
+
+def _borrowed_name(borrowed: Borrowed | None) -> str:
+    if borrowed is None:
+        return ""
+    return "_attentive" if borrowed == ATTENTIVE else f"_with_{borrowed.trait}_of_{borrowed.of or 'nobody'}"
 
 
 def player_of(strategy: Strategy) -> int:

@@ -207,7 +207,7 @@ def draw_member(shares: Sequence[float], player: int, *parts: str | int) -> int:
 
 
 def member_in_episode(shares: Sequence[float], player: int, seed: int, episode: int) -> int:
-    """The index of a player's driver in an episode of an assessment, the same in every arm."""
+    """The index of a player's driver in an episode of an assessment with this seed of the starts."""
     return draw_member(shares, player, *parts_of(seed, episode))
 
 

@@ -19,7 +19,7 @@ def generator_of(*parts: str | int) -> np.random.Generator:
 
 
 def parts_of(seed: int, episode: int) -> tuple[str | int, ...]:
-    """The parts that name the random numbers of an episode, the same in every arm."""
+    """The parts that name the random numbers of an episode; `seed` is that of the starts, the same in every arm."""
     return ("assessment", seed, "episode", episode)
 
 

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from harness.config.traits import TRAITS
 from harness.evaluation.strategies import (
+    ATTENTIVE,
     Arm,
+    Borrowed,
     EgoStrategy,
     NaiveEgo,
+    NonEgoStrategy,
+    PersonaNonEgo,
     ReconfiguredEgo,
     RetrainedEgo,
     SumoNonEgo,
@@ -27,7 +32,7 @@ def _in_words(arm: Arm, tables: RunTables) -> str:
         return f"{arm.pair.name}, {player} replaced by its best response"
     match arm:
         case Arm(ego=None, non_ego=non_ego) if non_ego is not None:
-            return f"the non-ego {strategy_name(non_ego)} without the ego"
+            return f"{_non_ego_in_words(non_ego)} without the ego"
         case Arm(ego=NaiveEgo(), non_ego=None):
             return f"the {tables.naive} on the road without the non-ego"
         case Arm(ego=ego, non_ego=None) if ego is not None:
@@ -40,9 +45,19 @@ def _in_words(arm: Arm, tables: RunTables) -> str:
             same = tables.who(against).removeprefix("the ") or against
             return f"{_ego_in_words(ego, tables.naive)}, against the same {same}"
         case Arm(ego=ego, non_ego=non_ego) if ego is not None and non_ego is not None:
-            name = strategy_name(non_ego)
-            return f"{_ego_in_words(ego, tables.naive)} against {tables.who(name) or f'the non-ego {name}'}"
+            person = tables.who(strategy_name(non_ego)) or _non_ego_in_words(non_ego)
+            return f"{_ego_in_words(ego, tables.naive)} against {person}"
     raise ValueError("an arm has at least one player")
+
+
+def _non_ego_in_words(non_ego: NonEgoStrategy) -> str:
+    match non_ego:
+        case PersonaNonEgo(persona=persona, borrowed=borrowed) if borrowed == ATTENTIVE:
+            return f"the non-ego {persona} with its eyes on the road"
+        case PersonaNonEgo(persona=persona, borrowed=Borrowed(trait=trait, of=of)):
+            return f"the non-ego {persona} with the {TRAITS[trait].words} of {of}"
+        case _:
+            return f"the non-ego {strategy_name(non_ego)}"
 
 
 def _ego_in_words(ego: EgoStrategy, naive: str) -> str:

@@ -24,6 +24,7 @@ from harness.reports.human_ranges import crashes_alone
 from harness.reports.key_figures import card_verdict, key_figures, portrait
 from harness.reports.numbers import MISSING, number, percent, sure
 from harness.reports.run_tables import QUESTIONS, Row, RunTables, failures, failures_of, played
+from harness.reports.scope_wording import over_trainings_statistics
 from harness.reports.verdict_wording import answer
 
 LONGEST_LABEL = 12
@@ -62,6 +63,11 @@ def card(persona: str, place: int, tables: RunTables, links: GameLinks) -> dict[
             f"{row['question']}{', seed ' + str(row['seed']) if tables.several_seeds else ''}. {statistics(row)}"
             for row in tests
             if row["p_value"] == row["p_value"]
+        ]
+        + [
+            over_trainings_statistics(row)
+            for row in tables.over_trainings.to_dict("records")
+            if row["persona"] == persona and row["p_value"] == row["p_value"]
         ],
         "rate_figure": rate_figure(
             columns, f"rate{place}", _alternative("Failure rate", columns, "failure_rate", percent)

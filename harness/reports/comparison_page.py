@@ -17,7 +17,9 @@ BETTER, WORSE, UNKNOWN = "better", "worse", "not the same games"
 EQUAL, NOT_SHOWN = "no difference", "no difference shown"
 TONES = {BETTER: "mended", WORSE: "harm"}
 NOTHING_IN_COMMON = "The runs have no arm and seed in common."
-DIFFERENT_SCENES = "The scenes differ, so games have different starts: there are no pairs and no tests."
+DIFFERENT_STARTS = (
+    "The scenes or the first training seeds differ, so games have different starts: there are no pairs and no tests."
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +52,11 @@ def headline(rows: Sequence[ComparedRow]) -> str:
 
 
 def render_comparison(
-    runs: Sequence[tuple[str, Mapping[str, Any]]], rows: Sequence[ComparedRow], *, same_scene: bool, significance: float
+    runs: Sequence[tuple[str, Mapping[str, Any]]],
+    rows: Sequence[ComparedRow],
+    *,
+    same_starts: bool,
+    significance: float,
 ) -> str:
     """The page as HTML. `runs` are name and manifest of both runs. Equal input gives equal text."""
     return (
@@ -63,7 +69,7 @@ def render_comparison(
             ],
             rows=rows,
             headline=headline(rows),
-            remark="" if same_scene else DIFFERENT_SCENES,
+            remark="" if same_starts else DIFFERENT_STARTS,
             significance=significance,
             several_seeds=len({row.found.seed for row in rows}) > 1,
         )

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from harness.evaluation.comparisons.comparison import HARM
 from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.unplayed_games import reasons_of
 from harness.reports import human_ranges
 from harness.reports.acceptance_wording import acceptance_lines, headline
 from harness.reports.arm_figures import MOST_DOTS
 from harness.reports.arm_glossary import glossary
+from harness.reports.attribution_section import attribution_section
 from harness.reports.cards import CAUTION, card
 from harness.reports.data_table import table
 from harness.reports.differences import METRIC_WORDS, effect
@@ -24,6 +24,7 @@ from harness.reports.next_steps import first_answers, next_steps
 from harness.reports.page_template import CONTENT_POLICY, ELSEWHERE, LIBRARIES, SCRIPTS, environment_of, sources
 from harness.reports.provenance import asked_alone, command_of, facts, made_by, mixed_versions
 from harness.reports.run_tables import RunTables, unplayed
+from harness.reports.scope_wording import planned_in_words
 
 MOST_ROWS = 10_000
 """The page leaves out a longer table of games and refers to its CSV file."""
@@ -31,7 +32,8 @@ GAMES_BYTES = 600_000
 """Room for recorded games. `harness serve` shows all."""
 QUICK = "Quick run: fewer training steps than table 1; not for conclusions."
 CAPTIONS = {
-    "comparisons": "Every test of the campaign.",
+    "comparisons": "Every test of a trained pair.",
+    "over_trainings": "Every test over trainings.",
     "summary": "A row per arm and training seed.",
     "training": "A row per window of a learning curve.",
     "episodes": "A row per game.",
@@ -51,20 +53,21 @@ def render_page(tables: RunTables, games: Iterable[GameTracks] = (), scene: Mapp
     texts = embedded_games(games if scene is not None else (), marks_of(tables.manoeuvres), tables.crowds, GAMES_BYTES)
     links = GameLinks(embedded=texts, episodes=tables.episodes)
     environment = environment_of("reports")
-    arms, pairs = failures_by_cause(tables.causes, texts)
+    arms, pairs = failures_by_cause(tables.of_own_traits(tables.causes), texts)
     steps = next_steps(tables)
     page = environment.get_template("report.html.jinja").render(
         **_header(tables),
         **_troubles(tables),
         acceptance=_acceptance(tables),
         answers=first_answers(tables, steps),
+        attribution=attribution_section(tables, links),
         next_steps=steps,
         cards=[card(persona, place, tables, links) for place, persona in enumerate(tables.personas, 1)],
         most_dots=MOST_DOTS if tables.episodes.groupby("arm").size().max() > MOST_DOTS else 0,
         caution=CAUTION,
         metrics={metric: words.name for metric, words in METRIC_WORDS.items()},
         effect=effect,
-        tests=int(tables.comparisons.loc[~tables.comparisons["metric"].isin(HARM), "p_value"].notna().sum()),
+        planned=planned_in_words(tables),
         embedded=texts,
         left=len(tables.played) - len(texts),
         recorded=recorded_document(scene, texts.values()),

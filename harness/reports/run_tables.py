@@ -67,12 +67,17 @@ class RunTables:
     episodes: pd.DataFrame = field(default_factory=_empty("episodes"))
     summary: pd.DataFrame = field(default_factory=_empty("summary"))
     comparisons: pd.DataFrame = field(default_factory=_empty("comparisons"))
+    over_trainings: pd.DataFrame = field(default_factory=_empty("over_trainings"))
+    """Empty: the campaign has too few training seeds."""
     training: pd.DataFrame = field(default_factory=_empty("training"))
     reconfiguration: pd.DataFrame = field(default_factory=_empty("reconfiguration"))
     """Empty: the report has no section on searches."""
     populations: pd.DataFrame = field(default_factory=_empty("populations"))
     causes: pd.DataFrame = field(default_factory=_empty("causes"))
     realism: pd.DataFrame = field(default_factory=_empty("realism"))
+    attribution: pd.DataFrame = field(default_factory=_empty("attribution"))
+    """Empty: the report has no section on traits."""
+    undecided: pd.DataFrame = field(default_factory=_empty("undecided"))
     reference_drivers: pd.DataFrame = field(default_factory=_empty("reference_drivers"))
     preventability: pd.DataFrame = field(default_factory=_empty("preventability"))
     """Empty: no failure was judged by reference drivers."""
@@ -106,9 +111,11 @@ class RunTables:
 
     @property
     def personas(self) -> list[str]:
-        """Every persona that the manifest or a table names, in order of first appearance."""
-        names = (*self.manifest.get("personas", ()), *self.comparisons["persona"], *self.summary["persona"])
-        return [name for name in dict.fromkeys(names) if name]
+        """Every persona that the manifest or a table names, in order of first appearance; without the baseline, unless
+        it is a persona of the campaign."""
+        own, baseline = self.manifest.get("personas", ()), self.manifest.get("baseline")
+        names = dict.fromkeys((*own, *self.comparisons["persona"], *self.summary["persona"]))
+        return [name for name in names if name and (name != baseline or name in own)]
 
     @cached_property
     def seeds(self) -> list[int]:
@@ -178,11 +185,21 @@ class RunTables:
         rows = self.comparisons
         return rows[(rows["question"] == question) & (rows["persona"] == persona)].to_dict("records")
 
+    def over_trainings_of(self, question: str, persona: str) -> Row | None:
+        """The row of `over_trainings` on a question about a persona; None: the campaign has too few training seeds."""
+        rows = self.over_trainings
+        found = rows[(rows["question"] == question) & (rows["persona"] == persona)].to_dict("records")
+        return found[0] if found else None
+
     def asked(self, question: str, persona: str) -> list[int]:
         """The training seeds of which a question is asked: its treatment is planned, or it is compared."""
         _, treatment = self.arms_of(question, persona)
         compared = {row["seed"] for row in self.tests_of(question, persona)}
         return [seed for seed in self.seeds if f"{treatment}-seed{seed}" in self.stages or seed in compared]
+
+    def of_own_traits(self, rows: pd.DataFrame) -> pd.DataFrame:
+        """The rows of a table in whose arms people have their own traits."""
+        return rows[~rows["arm"].isin([name for name, arm in self.arms.items() if arm.is_of_a_trait])]
 
     def causes_of(self, question: str, persona: str) -> tuple[str, ...]:
         """Why the ego failed against a persona in the arm that a question is about, a line for each kind of cause."""

@@ -1,22 +1,26 @@
-"""The answers to RQ1 and RQ2 as sentences, taken from rows of `comparisons` and `summary` alone.
+"""The answers to RQ1 and RQ2 as sentences, taken from rows of `comparisons`, `over_trainings` and `summary` alone.
 
-A label says "yes" only for `Verdict.SIGNIFICANT`. Every other label says what is missing for a yes.
+A label says "yes" only for `Verdict.SIGNIFICANT`. Every other label says what is missing for a yes. With three training
+seeds or more the answer is that over trainings, and the trained pairs by themselves are listed below it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from harness.evaluation.competence import WITHHELD, Verdict
+from harness.evaluation.planned_tests import About
 from harness.reports.differences import CHANCE, NO_T_STATISTIC, speed_sentence, too_few
 from harness.reports.human_ranges import declared_unlike
 from harness.reports.numbers import p_text
 from harness.reports.run_tables import Row, RunTables, failures_of, played
+from harness.reports.scope_wording import over_trainings_sentence, scope_of
 
 Tone = Literal["harm", "mended", "open"]
-"""harm: RQ1 is yes in any seed; mended: RQ2 is yes in all seeds; open: everything else."""
+"""harm: RQ1 is yes; mended: RQ2 is yes; open: everything else. With two training seeds, RQ1 is yes in any, RQ2 in
+both."""
 
 TONE_OF_YES: dict[str, Tone] = {"RQ1": "harm", "RQ2": "mended"}
 YES, NOT_ANSWERED = "yes", "not answered"
@@ -24,9 +28,11 @@ LABELS = {
     Verdict.SIGNIFICANT: YES,
     Verdict.BEFORE_HOLM_ONLY: "only before Holm's correction",
     Verdict.NOT_SIGNIFICANT: "not shown",
+    Verdict.SECONDARY: "not shown",
     Verdict.NO_DIFFERENCE: "no difference",
     Verdict.ALL_EQUAL: "no t statistic",
     Verdict.NOT_ENOUGH_PAIRS: NOT_ANSWERED,
+    Verdict.NOT_ENOUGH_TRAININGS: NOT_ANSWERED,
     **{verdict: verdict.value for verdict in WITHHELD},
 }
 NO_ROUND_2 = "Round 2 was not played: this ego has nothing to train or to tune."
@@ -44,6 +50,12 @@ class Answer:
     sentence: str
     speed: str = ""
     """What happened to the average speed; empty when it was not compared."""
+    about: About | None = None
+    """What it holds for; None: there is no test."""
+    planned_tests: int = 0
+    """The tests of its family, itself included."""
+    scope: str = ""
+    """The two in words."""
     per_seed: Sequence[Answer] = ()
     """The answer for each seed when there are several."""
 
@@ -54,7 +66,30 @@ def answer(tables: RunTables, question: str, persona: str) -> Answer:
     if not answers:
         sentence = NO_ROUND_2 if question == "RQ2" else "Not compared."
         return Answer(question=question, label="not asked", sentence=sentence)
-    return answers[0] if len(answers) == 1 else _of_seeds(tables, question, persona, answers)
+    if len(answers) == 1:
+        return answers[0]
+    row = tables.over_trainings_of(question, persona)
+    several = _of_seeds(tables, question, persona, answers)
+    return several if row is None else _over_trainings(tables, row, several)
+
+
+def _over_trainings(tables: RunTables, row: Row, by_seed: Answer) -> Answer:
+    """The answer over trainings; `by_seed` is that of the trained pairs by themselves."""
+    verdict, planned = Verdict(row["verdict"]), int(row["planned_tests"])
+    answers = by_seed.per_seed
+    if verdict is Verdict.NOT_ENOUGH_TRAININGS and all(each.label.startswith(NOT_ANSWERED) for each in answers):
+        return by_seed
+    yes = sum(each.label == YES for each in answers)
+    sentence = over_trainings_sentence(row, tables, _who(tables, row["persona"]))
+    return replace(
+        by_seed,
+        label=LABELS[verdict],
+        tone=TONE_OF_YES[row["question"]] if verdict is Verdict.SIGNIFICANT else "open",
+        sentence=f"{sentence} Each trained pair by itself: yes in {yes} of {len(answers)}.",
+        about=About.TRAININGS,
+        planned_tests=planned,
+        scope=scope_of(About.TRAININGS, planned, len(tables.seeds)),
+    )
 
 
 def _who(tables: RunTables, persona: str) -> str:
@@ -77,7 +112,19 @@ def _of_seeds(tables: RunTables, question: str, persona: str, answers: Sequence[
             sentence += f" In {len(unanswered)} of {seeds} it is not answered."
     harmed = question == "RQ1" and yes > 0
     tone = TONE_OF_YES[question] if harmed or yes == seeds else "open"
-    return Answer(question=question, label=label, tone=tone, sentence=sentence, per_seed=answers)
+    scope = next((each.scope for each in answers if each.scope), "")
+    planned = max(each.planned_tests for each in answers)
+    about = About.TRAINED_PAIR if planned else None
+    return Answer(
+        question=question,
+        label=label,
+        tone=tone,
+        sentence=sentence,
+        per_seed=answers,
+        about=about,
+        planned_tests=planned,
+        scope=scope,
+    )
 
 
 def _of_seed(tables: RunTables, question: str, persona: str, seed: int) -> Answer:
@@ -86,13 +133,16 @@ def _of_seed(tables: RunTables, question: str, persona: str, seed: int) -> Answe
     before, after = (tables.rates.get((name, seed)) for name in names)
     unplayed = [name for name, row in zip(names, (before, after), strict=True) if played(row) == 0]
     failure, speed = by_metric.get("failure"), by_metric.get("mean_speed")
+    not_answered = Answer(question=question, seed=seed, label=NOT_ANSWERED, sentence="")
     if unplayed or failure is None or before is None or after is None:
         sentence = f"Not played: {' and '.join(unplayed)}." if unplayed else "The failures were not compared."
-        return Answer(question=question, seed=seed, label=NOT_ANSWERED, sentence=sentence)
-    verdict = Verdict(failure["verdict"])
+        return replace(not_answered, sentence=sentence)
+    verdict, planned = Verdict(failure["verdict"]), int(failure["planned_tests"])
+    scope = scope_of(About.TRAINED_PAIR, planned, len(tables.seeds))
+    asked = replace(not_answered, about=About.TRAINED_PAIR, planned_tests=planned, scope=scope)
     if verdict in WITHHELD:
         sentence = as_sentence(failure["reason"])
-        return Answer(question=question, seed=seed, label=LABELS[verdict], sentence=sentence)
+        return replace(asked, label=LABELS[verdict], sentence=sentence)
     sentence = _failure_sentence(tables, failure, before, after)
     if verdict is Verdict.ALL_EQUAL and tables.significance is not None:
         below = "below" if failure["mcnemar_p"] < tables.significance else "not below"
@@ -102,9 +152,8 @@ def _of_seed(tables: RunTables, question: str, persona: str, seed: int) -> Answe
         told_speed = speed_sentence(speed, before, after, tables.significance)
         if speed["pairs_left_out"] != failure["pairs_left_out"]:
             told_speed += left_out(speed)
-    return Answer(
-        question=question,
-        seed=seed,
+    return replace(
+        asked,
         label=LABELS[verdict],
         tone=TONE_OF_YES[question] if verdict is Verdict.SIGNIFICANT else "open",
         sentence=" ".join(filter(None, (sentence + left_out(failure), declared_unlike(tables.realism, persona, seed)))),

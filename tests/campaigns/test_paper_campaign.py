@@ -57,7 +57,17 @@ def names_in(folder: Path) -> set[str]:
 
 
 def test_campaign__every_file_is_there(run: Path) -> None:
-    names = ("training", "episodes", "summary", "comparisons", "causes", "manoeuvres", "conduct", "realism")
+    names = (
+        "training",
+        "episodes",
+        "summary",
+        "comparisons",
+        "causes",
+        "manoeuvres",
+        "conduct",
+        "realism",
+        "undecided",
+    )
     tables = [f"{name}.csv" for name in names]
     folders = ("policies", "traces", "replays", "scene", "tensorboard")
     others = ("manifest.json", "result.json", "junit.xml", "report.html", "harness.log")

@@ -12,10 +12,11 @@ import pytest
 
 from harness.config.pinned_game import PinnedGame
 from harness.config.toml_reading import read_document
+from harness.errors import NOT_ACCEPTED
 from harness.evaluation.tables import read_csv
 from tests.support import shipped
 from tests.support.shipped import NAIVE, PERSON, POLICIES, RETRAINED, stage
-from tests.support.tiny import SHIPPED, carried_out, finished, harness, numbers
+from tests.support.tiny import SHIPPED, carried_out, finished, harness, numbers, write_campaign
 
 ARM = f"naive_vs_{shipped.SPEEDY}"
 
@@ -147,3 +148,31 @@ def test_regression__refuses_what_is_not_the_pinned_game(pinned: Path, tmp_path:
     done = harness("regression", changed, "--ego", POLICIES / NAIVE)
     assert done.returncode == 2
     assert "is not the policy of this game" in done.stderr
+
+
+# --- a second training seed ---
+
+
+def test_minimise__a_failure_of_the_second_training_seed_has_the_starts_of_the_first(tmp_path: Path) -> None:
+    """The second training is a copy of the first: it plays the same games, and fails in the same."""
+    policies = tmp_path / "policies"
+    for folder in (each for each in POLICIES.iterdir() if each.is_dir()):
+        shutil.copytree(folder, policies / folder.name)
+        copy = shutil.copytree(folder, policies / folder.name.replace(f"seed{shipped.SEED}", f"seed{shipped.SEED + 1}"))
+        card = (copy / "policy.json").read_text(encoding="utf-8").replace(folder.name, copy.name)
+        (copy / "policy.json").write_text(card, encoding="utf-8")
+    changes: dict[str, Any] = {**SHIPPED, "seeds": [shipped.SEED, shipped.SEED + 1], "policies": str(policies)}
+    run = tmp_path / "run"
+    carried_out(write_campaign(tmp_path, **changes, assessment={"episodes": 8, "reference_drivers": True}), run)
+    judged = read_csv(run / "reference_drivers.csv")
+    first, second = (rows.drop(columns="seed").reset_index(drop=True) for _, rows in judged.groupby("seed"))
+    pd.testing.assert_frame_equal(first, second, check_exact=True)
+    failed = judged.loc[judged["arm"] == ARM, "episode"]
+    out = tmp_path / "games"
+    options = ("--seed", shipped.SEED + 1, "--policies", policies, "--out", out)
+    done = harness("minimise", run, ARM, int(failed.iloc[0]), *options)
+    assert done.returncode == 0, done.stdout + done.stderr
+    game = game_of(out)
+    assert (game.seed, game.start_seed) == (shipped.SEED + 1, shipped.SEED)
+    again = harness("regression", out, "--ego", policies / NAIVE)
+    assert again.returncode == NOT_ACCEPTED, again.stdout + again.stderr

@@ -109,6 +109,7 @@ def test_check__lists_the_stages_and_writes_nothing(tmp_path: Path, run_command:
     opened = open_campaign(campaign)
     stages = plan(opened.document, [persona.name for persona in opened.personas], opened.tunable)
     lines = [f"{campaign} is in order.", messages.work(opened, stages), *messages.stage_lines(stages)]
+    lines.append("Holm's correction over 2 tests about this trained pair: RQ1 speedy, RQ2 speedy (training seed 1)")
     assert result.out.splitlines() == lines
     assert lines[1] == "3 trainings of up to 2,048 steps, 6 arms of 4 episodes:"
     assert "  assess naive_vs_speedy-seed1  after naive-seed1, speedy-seed1" in lines

@@ -40,6 +40,11 @@ def test_check__json_has_the_stages(tmp_path: Path) -> None:
     stages = {each["stage"]: each for each in checked["stages"]}
     assert stages["naive_vs_speedy-seed1"]["after"] == ["speedy-seed1"]
     assert {each["kind"] for each in checked["stages"]} == {"training", "assessment"}
+    (family,) = checked["planned_tests"]
+    assert family == {
+        "about": "this trained pair",
+        "tests": [{"question": "RQ1", "persona": "speedy", "seeds": [1]}],
+    }
     assert as_json("check", PAPER_MERGE)["scene"] == str(PAPER_MERGE)
 
 

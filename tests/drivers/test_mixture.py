@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from harness.assessment.rollout import SeatedArm, assess
-from harness.campaign.results.evaluate_run import by_who_drove
+from harness.campaign.results.population_rows import by_who_drove
 from harness.config.campaign import Campaign, Population
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
@@ -141,7 +141,8 @@ def test_by_who_drove__has_the_members_of_the_games(merge: OpenScene, people: di
     arm = SeatedArm(name="naive_vs_town", scene=merge, drivers=drivers, seed=3)
     played = pd.DataFrame([{"arm": arm.name, "persona": "town", "seed": 3, **game.record} for game in assess(arm, 8)])
     episodes = typed(played.reindex(columns=list(TABLES["episodes"])))
-    campaign = Campaign(name="any", scene="any", personas=["any"], population=[Population(name="town", shares=shares)])
+    town = [Population(name="town", shares=shares)]
+    campaign = Campaign(name="any", scene="any", personas=["any"], seeds=[3], population=town)
     found = by_who_drove(campaign, episodes).set_index("persona")
     drove = [list(shares)[member] for member in drawn_members(merge, [people[name] for name in shares], 3, 8)]
     assert set(drove) == set(shares)

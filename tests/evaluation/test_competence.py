@@ -151,15 +151,15 @@ def test_compare__the_failures_of_a_person_that_cannot_drive_are_no_answer() -> 
     assert failure["mean_difference"] == 29 / 30  # what happened in the games stays
 
 
-def test_compare__unanswered_questions_are_not_in_holms_family() -> None:
+def test_compare__unanswered_questions_stay_in_holms_family() -> None:
     mild = arm("naive_vs_bert", ego=["rail"] * 5 + ["goal"] * 25, non_ego=["goal"] * 30)
     alone = arm("bert_alone", non_ego=["goal"] * 30)
     bert = replace(PERSON, words="the bert driver", arm="bert_alone")
     asked = replace(RQ1, persona="bert", treatment="naive_vs_bert", alone=(EGO, bert))
     episodes = pd.concat([table(30, 0, of=30), mild, alone], ignore_index=True)
     with_it = [row for row in compared(episodes, RQ1, asked) if row["persona"] == "bert"]
-    pd.testing.assert_frame_equal(pd.DataFrame(with_it), pd.DataFrame(compared(episodes, asked)))
-    assert with_it[0]["p_holm"] == with_it[0]["p_value"]  # the only test of the family
+    assert with_it[0]["planned_tests"] == 2
+    assert with_it[0]["p_holm"] == 2 * with_it[0]["p_value"]  # type: ignore[operator]
 
 
 # --- a person that is unlike people -----------------------------------------------------------------------------------

@@ -105,3 +105,10 @@ def test_lapses__by_hand(merge: OpenScene) -> None:
     row = conduct(merge, car("ego"), lapsed=lapsed)
     assert row["looks_away_share"] == pytest.approx(13 / 59)
     assert row["longest_lapse_s"] == pytest.approx(1.0)
+    assert row["undecided_at_end_s"] == 0.0
+
+
+def test_undecided__counts_from_the_last_decision_to_the_end(merge: OpenScene) -> None:
+    at_end = np.isin(np.arange(STEPS), [*range(10, 20), *range(STEPS - 7, STEPS)])
+    assert conduct(merge, car("ego"), lapsed=at_end)["undecided_at_end_s"] == pytest.approx(0.7)
+    assert conduct(merge, car("ego"), lapsed=True)["undecided_at_end_s"] == pytest.approx(5.9)

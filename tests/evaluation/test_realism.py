@@ -23,7 +23,16 @@ from harness.evaluation.realism import (
     HumanFigure,
     realism,
 )
-from harness.evaluation.strategies import NAIVE_ALONE, Arm, NaiveEgo, against_persona, persona_alone
+from harness.evaluation.strategies import (
+    ATTENTIVE,
+    NAIVE_ALONE,
+    Arm,
+    Borrowed,
+    NaiveEgo,
+    PersonaNonEgo,
+    against_persona,
+    persona_alone,
+)
 from harness.evaluation.tables import table_of
 
 ARMS = {arm.name: arm for arm in (NAIVE_ALONE, persona_alone("speedy"), against_persona(NaiveEgo(), "speedy"))}
@@ -105,7 +114,7 @@ def test_crashes__are_outside_where_the_interval_is_above_the_rate_of_people() -
 def test_crash_odds__are_those_alone_against_the_same_person_without_lapses() -> None:
     """Of 13 crashes in all, those with lapses have Fisher's noncentral hypergeometric distribution: the estimate makes
     10 their mean, and at the ends of the interval 10 or more, or 10 or fewer, have the probability 0.025."""
-    arms = ARMS | {"speedy_attentive_alone": persona_alone("speedy", attentive=True)}
+    arms = ARMS | {"speedy_attentive_alone": persona_alone("speedy", ATTENTIVE)}
 
     def odds(crashes: int, attentive: int) -> dict[Any, Any]:
         sides = (("speedy_alone", crashes), ("speedy_attentive_alone", attentive))
@@ -128,13 +137,22 @@ def test_crash_odds__are_those_alone_against_the_same_person_without_lapses() ->
 
 
 def test_crash_odds__do_not_mix_the_attentive_games_with_the_person_s_own() -> None:
-    arms = ARMS | {"speedy_attentive_alone": persona_alone("speedy", attentive=True)}
+    arms = ARMS | {"speedy_attentive_alone": persona_alone("speedy", ATTENTIVE)}
     own = games("speedy_alone", "non_ego", lane_change_s=5.0)
     attentive = games("speedy_attentive_alone", "non_ego", lane_change_s=1.0)
     rows = found(own, attentive, arms=arms)
     assert (rows["speedy", "lane_change_s"]["games"], rows["speedy", "lane_change_s"]["value"]) == (5, 5.0)
     assert {player for player, _ in rows} == {"speedy"}
     assert ("speedy", CRASH_ODDS) not in found(own)  # a person without lapses
+
+
+def test_players__an_arm_that_exchanges_a_trait_is_no_drive_of_theirs() -> None:
+    person = PersonaNonEgo(persona="speedy", borrowed=Borrowed(trait="reaction", of="careful"))
+    arm = Arm(ego=NaiveEgo(), non_ego=person)
+    own = [games("naive_vs_speedy", player, lane_change_s=5.0) for player in ("ego", "non_ego")]
+    exchanged = [games(arm.name, player, lane_change_s=1.0) for player in ("ego", "non_ego")]
+    rows = found(*own, *exchanged, arms=ARMS | {arm.name: arm})
+    assert {rows[player, "lane_change_s"]["games"] for player in ("naive ego", "speedy")} == {LEAST_GAMES}
 
 
 def test_seeds__have_rows_of_their_own() -> None:

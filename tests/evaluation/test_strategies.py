@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from harness.evaluation.strategies import (
+    ATTENTIVE,
     Arm,
     BestResponse,
     NaiveEgo,
@@ -40,7 +41,7 @@ RESPONSE = Arm(ego=NaiveEgo(), non_ego=SPEEDY, best_response_of=NON_EGO)
         (SumoNonEgo(), "sumo", NON_EGO, 0),
         (SPEEDY, "speedy", NON_EGO, 1),
         (PersonaNonEgo(persona="speedy", round=3), "speedy_round3", NON_EGO, 3),
-        (PersonaNonEgo(persona="speedy", attentive=True), "speedy_attentive", NON_EGO, 1),
+        (PersonaNonEgo(persona="speedy", borrowed=ATTENTIVE), "speedy_attentive", NON_EGO, 1),
         (BestResponse(arm=RESPONSE, start=2), "naive_vs_speedy_non_ego_response2", NON_EGO, 0),
     ],
 )
@@ -56,7 +57,7 @@ def test_strategy__name_player_and_round(strategy: Strategy, name: str, player: 
         (Arm(ego=NaiveEgo(), non_ego=SPEEDY), "naive_vs_speedy"),
         (Arm(non_ego=SPEEDY), "speedy_alone"),
         (Arm(non_ego=PersonaNonEgo(persona="speedy", round=3)), "speedy_round3_alone"),
-        (persona_alone("speedy", attentive=True), "speedy_attentive_alone"),
+        (persona_alone("speedy", ATTENTIVE), "speedy_attentive_alone"),
         (Arm(ego=RETRAINED), "retrained_alone_speedy"),
         (Arm(ego=LATER), "retrained_speedy_round4_alone"),
         (Arm(ego=ReconfiguredEgo(against="speedy")), "reconfigured_alone_speedy"),

@@ -126,7 +126,7 @@ def test_write_csv__truth_values_are_true_and_false(tmp_path):
     path = tmp_path / "comparisons.csv"
     row = {"question": "RQ1", "persona": "x", "seed": 1, "metric": "failure", "pairs": 2, "pairs_left_out": 0}
     write_csv(table_of("comparisons", [row | {"mean_difference": 0.0, "rejects_h0": False}]), path)
-    assert path.read_text().splitlines()[1] == "RQ1,x,1,failure,2,0,0.0,,,,,,,,false,,"
+    assert path.read_text().splitlines()[1] == "RQ1,x,1,failure,2,0,0.0,,,,,,,,,false,,,"
 
 
 def test_write_csv__puts_columns_in_the_order_of_the_table(tmp_path):

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from harness.evaluation.tables import table_of
 from tests.support.chromium import accessibility_violations, unfold
-from tests.support.game_tables import findings
+from tests.support.game_tables import findings, trait_row
 from tests.support.pages import campaign, rendered, with_errors
 
 GAME, OTHER = "naive_vs_speedy,1,6", "retrained_vs_speedy,1,6"
@@ -14,7 +15,9 @@ GAME, OTHER = "naive_vs_speedy,1,6", "retrained_vs_speedy,1,6"
 @pytest.fixture(scope="module")
 def report(write_report):
     arguments = campaign(games=20, quick=True)
-    return write_report(with_errors(arguments, arguments["episodes"]["episode"] == 14), game=findings())
+    traits = table_of("attribution", [trait_row("all", 26, 2), trait_row("shoulder_glance", 26, 3, example=4)])
+    errored = with_errors(arguments, arguments["episodes"]["episode"] == 14)
+    return write_report(errored, game=findings(), attribution=traits)
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

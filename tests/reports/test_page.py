@@ -18,6 +18,7 @@ from harness.reports.differences import CHANCE, NO_T_STATISTIC, effect, p_values
 from harness.reports.numbers import duration, number, p_number, p_text, percent, signed
 from harness.reports.page import REPLAYS_SHOWN
 from harness.reports.run_tables import RunTables
+from harness.reports.scope_wording import planned_in_words
 from harness.reports.verdict_wording import NO_ROUND_2, answer
 from tests.support.incompetent import cannot_drive
 from tests.support.pages import Page, blank_figures, campaign, recomputed, recordings, rendered, with_errors
@@ -122,8 +123,14 @@ MCNEMAR = "McNemar's exact test gives p < 0.0001. This is below the campaign's s
         (partial(campaign, personas=["speedy"], retrained=False), "RQ2: not asked", NO_ROUND_2),
         (
             tame_in_one_seed,
-            "RQ1: yes in 2 of 3 seeds",
-            "In 2 of 3 training seeds the speedy driver makes the naive ego",
+            "RQ1: not shown",
+            f"single trainings 0 to 30: {CHANCE}. Each trained pair by itself: yes in 2 of 3.",
+        ),
+        (
+            partial(campaign, personas=["speedy"], seeds=(1, 2, 3)),
+            "RQ2: yes",
+            "Over 3 trainings, the retrained ego against the speedy driver, compared with the naive ego: "
+            "26.7 points fewer failures (95 %: ",
         ),
     ],
 )
@@ -131,6 +138,37 @@ def test_words__say_no_more_than_the_verdict(arguments, label, sentence):
     answers = dict(verdict_texts(arguments()))
     assert label in answers
     assert sentence in answers[label]
+
+
+@pytest.mark.parametrize(
+    ("seeds", "about", "tests"),
+    [
+        ((1,), "this trained pair", "one of 4 planned tests; trainings like this need 3 training seeds"),
+        ((1, 2), "this trained pair", "one of 8 planned tests; trainings like this need 3 training seeds"),
+        ((1, 2, 3), "trainings like this", "one of 4 planned tests"),
+    ],
+)
+def test_words__say_what_the_verdict_is_about_and_of_how_many_tests_it_is_one(seeds, about, tests):
+    run = RunTables(**campaign(seeds=seeds))
+    found = answer(run, "RQ1", "speedy")
+    assert (found.about, found.scope) == (about, f"About {about}, {tests}.")
+    assert {each.about for each in found.per_seed} <= {"this trained pair"}
+    pairs = f"{4 * len(seeds)} planned tests about this trained pair"
+    over = ", and by itself over 4 planned tests about trainings like this" if len(seeds) > 2 else ""
+    assert planned_in_words(run) == pairs + over
+
+
+def test_words__a_question_that_most_trainings_do_not_answer_says_so():
+    arguments = cannot_drive(campaign(personas=["speedy"], seeds=(1, 2, 3)), [1])
+    found = answer(RunTables(**arguments), "RQ1", "speedy")
+    assert (found.label, found.about) == ("not answered", "trainings like this")
+    assert found.sentence == (
+        "The question is answered for 2 of 3 trainings, and trainings like this need 3 training seeds. "
+        "Each trained pair by itself: yes in 2 of 3."
+    )
+    arguments = cannot_drive(campaign(personas=["speedy"], seeds=(1, 2, 3)), [1, 2, 3])
+    found = answer(RunTables(**arguments), "RQ1", "speedy")
+    assert found.label == "not answered: the person can't drive this scene"
 
 
 def test_words__several_seeds_are_shown_each():
@@ -151,7 +189,7 @@ def test_words__only_significant_is_a_yes(verdict, question, small):
         "pairs_left_out": 0,
     }
     row |= {"p_value": 0.004, "p_holm": 0.02, "mcnemar_p": 0.004, "reason": "the speedy driver can't drive this scene"}
-    row |= {"mean_difference": 0.3, "ci_low": 0.1, "ci_high": 0.5}
+    row |= {"mean_difference": 0.3, "ci_low": 0.1, "ci_high": 0.5, "planned_tests": 2}
     rows = [row | {"metric": metric} for metric in ("failure", "mean_speed")]
     found = answered(question, rows, small)
     yes = verdict is Verdict.SIGNIFICANT

@@ -17,6 +17,7 @@ from harness.campaign.plan.paper_rounds import questions
 from harness.config.campaign import Campaign
 from harness.evaluation.columns import TABLES
 from harness.evaluation.comparisons.comparison import compare
+from harness.evaluation.comparisons.over_trainings import compare_over_trainings
 from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.competence import ResearchQuestion
 from harness.evaluation.strategies import (
@@ -101,7 +102,7 @@ def campaign(
         "strategies": {strategy_name(each): each for each in strategies},
         "episodes": episodes,
         "summary": summarise(episodes),
-        "comparisons": _compared(manifest, episodes, {"RQ1", "RQ2"} if retrained else {"RQ1"}),
+        **_compared(manifest, episodes, {"RQ1", "RQ2"} if retrained else {"RQ1"}),
         "training": typed(training),
         "replays": replays,
     }
@@ -112,11 +113,14 @@ def _compared(
     episodes: pd.DataFrame,
     asked: Collection[ResearchQuestion],
     competence: Mapping[str, float] = UNGATED,
-) -> pd.DataFrame:
-    """The answers of the episodes to these questions; `competence` is the table of a campaign."""
+) -> dict[str, pd.DataFrame]:
+    """The answers of the episodes to these questions, for each pair and over trainings; `competence` is the table of a
+    campaign."""
     document = {"name": "a", "scene": "b", "personas": ["x.toml"], "seeds": manifest["seeds"], "competence": competence}
     of_campaign = questions(Campaign.model_validate(document), manifest["personas"])
-    return compare([each for each in of_campaign if each.question in asked], episodes, 0.01)
+    planned = [each for each in of_campaign if each.question in asked]
+    over = compare_over_trainings(planned, episodes, 0.01)
+    return {"comparisons": compare(planned, episodes, 0.01), "over_trainings": over}
 
 
 def _game(
@@ -251,5 +255,4 @@ def with_errors(arguments: dict[str, Any], games: Any) -> dict[str, Any]:
 def recomputed(arguments: dict[str, Any], competence: Mapping[str, float] = UNGATED) -> dict[str, Any]:
     """The campaign with tables that fit its changed episodes; `competence` is its table of that name."""
     episodes, asked = arguments["episodes"], set(arguments["comparisons"]["question"])
-    comparisons = _compared(arguments["manifest"], episodes, asked, competence)
-    return arguments | {"summary": summarise(episodes), "comparisons": comparisons}
+    return arguments | {"summary": summarise(episodes)} | _compared(arguments["manifest"], episodes, asked, competence)

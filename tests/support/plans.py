@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ from harness.campaign.preflight import open_campaign
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign
 from harness.config.persona import Persona
+from harness.config.traits import UNREAD, PersonTraits
 from harness.evaluation.strategies import PersonaNonEgo
 from tests.support.tiny import write_campaign
 
@@ -32,9 +32,9 @@ def campaign_of(*personas: str, **changes: Any) -> Campaign:
     return Campaign.model_validate({**document, **changes})
 
 
-def stages_of(*personas: str, tunable: bool = False, lapsing: Sequence[str] = (), **changes: Any) -> dict[str, Any]:
+def stages_of(*personas: str, tunable: bool = False, traits: PersonTraits = UNREAD, **changes: Any) -> dict[str, Any]:
     """The stages of `campaign_of`, by name and in order. It has one seed."""
-    return {stage.name: stage for stage in plan(campaign_of(*personas, **changes), personas, tunable, lapsing)}
+    return {stage.name: stage for stage in plan(campaign_of(*personas, **changes), personas, tunable, traits)}
 
 
 def training_of(name: str, *needs: str, seed: int = 1) -> Stage:

@@ -181,7 +181,7 @@ def _play_free(
 
     `on_game` gets the number of games played in the current one.
     """
-    stage, played, episodes = stage_id(arm.name, arm.seed), 0, deque[int]()
+    stage, played, episodes = stage_id(labels["arm"], labels["seed"]), 0, deque[int]()
     folder, upcoming = run.context.folder, iter(episodes.popleft, None)
     with closing(assess(arm, upcoming, run.on_start, run.attempt.abandoned)) as games:  # type: ignore[type-var]
         for segment in segments:

@@ -10,12 +10,14 @@ from collections.abc import Sequence
 from typing import Any
 
 from harness.campaign.plan.stages import (
+    AssessmentStage,
     BestOf,
     External,
     PreventabilityStage,
     SearchStage,
     Stage,
     TrainingStage,
+    borrowed_of,
     members_of,
     persona_of,
 )
@@ -43,10 +45,11 @@ def stage_keys(campaign: OpenCampaign, stages: Sequence[Stage]) -> dict[str, str
 def _inputs(campaign: OpenCampaign, stage: Stage) -> dict[str, Any]:
     """What one stage's numbers depend on, beside the scene and other stages."""
     document = campaign.document
-    personas = {"": campaign.ego_persona, **{each.name: each for each in campaign.personas}}
+    personas = {"": campaign.ego_persona, **campaign.people}
     own = [stage.persona] if stage.persona in personas else []
     players = members_of(*(stage.opponent if isinstance(stage, TrainingStage | SearchStage) else stage.drivers))
-    names = dict.fromkeys(["", *own, *map(persona_of, players)])
+    givers = [borrowed.of for each in players if (borrowed := borrowed_of(each)) is not None]
+    names = dict.fromkeys(["", *own, *map(persona_of, players), *givers])
     people = [personas[name].model_dump(mode="json", exclude={"unlike_people"}) for name in names]  # it changes no game
     inputs: dict[str, Any] = {"stage": repr(stage), "personas": people}
     match stage:
@@ -60,6 +63,8 @@ def _inputs(campaign: OpenCampaign, stage: Stage) -> dict[str, Any]:
             inputs["references"] = reference_identity()
         case _:
             inputs["episodes"] = document.assessment.episodes
+    if isinstance(stage, AssessmentStage | PreventabilityStage) and stage.seed != document.start_seed:
+        inputs["start_seed"] = document.start_seed  # that of the first training seed is in the stage
     if campaign.policies is not None and stage.reads:
         others = campaign.policy_drivers
         read = {name: policy_files(campaign.policies / name) for name in stage.reads if name not in others}

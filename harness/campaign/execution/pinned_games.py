@@ -103,7 +103,7 @@ class PinnedGames:
         stage, scene = self._players.arm(failure.arm, failure.seed), self._players.scene
         ego, people = self._players.ego(stage), self._players.people(stage, failure.episode)
         drivers = tuple(mixture_of(each.driver, each.persona) for each in (ego, *people))
-        arm = SeatedArm(name=failure.arm, scene=scene, drivers=drivers, seed=failure.seed)
+        arm = SeatedArm(name=failure.arm, scene=scene, drivers=drivers, seed=self._players.start_seed)
         with StartTrials(arm, failure.episode) as trials:
             game = trials.play(None)
             if not game.record.get("ego_failed"):
@@ -130,6 +130,7 @@ class PinnedGames:
                 },
                 "arm": failure.arm,
                 "seed": failure.seed,
+                "start_seed": self._players.start_seed if self._players.start_seed != failure.seed else None,
                 "episode": failure.episode,
                 "outcome": str(last.record["ego_outcome"]),
                 "found_with": ego.policy.name if ego.policy is not None else failure.arm.partition("_vs_")[0],
@@ -150,16 +151,16 @@ class PinnedGames:
         games = self._episodes
         of_arm = (games["arm"] == stage.name) & (games["seed"] == stage.seed)
         passed = games.loc[of_arm & (games["error"] == "") & (games["ego_failed"] == 0), "episode"]
-        starts = [self._start_of(stage, int(episode)) for episode in passed]
+        starts = [self._start_of(int(episode)) for episode in passed]
         starts.sort(key=lambda start: float(np.abs((start - failing) / _tolerance(failing)).max()))
         yield from starts[:_MOST_STARTS]
 
-    def _start_of(self, stage: AssessmentStage, episode: int) -> FloatArray:
+    def _start_of(self, episode: int) -> FloatArray:
         """[2 P] the start that is drawn for an episode."""
         scene = self._players.scene
         players = len(scene.world.roles)
         distribution = scene.start_distribution([HumanFactors()] * players, [1.0] * players)
-        drawn = draw_initial_state(distribution, *parts_of(stage.seed, episode))
+        drawn = draw_initial_state(distribution, *parts_of(self._players.start_seed, episode))
         return np.concatenate((drawn.position_m, drawn.speed_mps))
 
     def _write(self, place: str, content: bytes) -> str:

@@ -23,6 +23,7 @@ from harness.campaign.plan.stages import (
     SumoDriven,
     Trained,
     TrainedBefore,
+    borrowed_of,
     description,
     driver_in,
     persona_of,
@@ -32,6 +33,7 @@ from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.trained_policies import DRIVER
 from harness.config.driver import read_driver
 from harness.config.persona import Persona
+from harness.config.traits import with_trait_of
 from harness.config.tunable import Adjustable
 from harness.drivers.car import car_of
 from harness.drivers.mixture import Member, Mixture
@@ -57,7 +59,7 @@ class PlayerFactory:
     def arm(self, stage: AssessmentStage) -> SeatedArm:
         """The arm of an assessment. A `BestOf` in it has to be `chosen` first."""
         drivers = (self.player(driver_in(stage.ego, 0)), *self.people(stage.non_ego))
-        return SeatedArm(name=stage.name, scene=self.scene, drivers=drivers, seed=stage.seed)
+        return SeatedArm(name=stage.name, scene=self.scene, drivers=drivers, seed=self.context.document.start_seed)
 
     def people(self, side: Side) -> tuple[Mixture | None, ...]:
         """The drivers in each place of the non-egos, each made anew."""
@@ -111,20 +113,22 @@ class PlayerFactory:
     def _mixture(self, members: tuple[PlannedMember, ...], shares: tuple[float, ...]) -> Mixture:
         return Mixture(
             tuple(
-                Member(driver=self.driver(each), persona=self._persona(each), share=share)
+                Member(driver=self.driver(each), persona=self.persona(each), share=share)
                 for each, share in zip(members, shares, strict=True)
                 if share > _LEAST_SHARE
             )
         )
 
-    def _persona(self, planned: PlannedMember) -> Persona:
-        persona = self.context.persona(persona_of(planned))
-        is_attentive = isinstance(planned, Trained | TrainedBefore) and planned.attentive
-        return persona.model_copy(update={"attention": None}) if is_attentive else persona
+    def persona(self, planned: PlannedMember) -> Persona:
+        """The persona with which a driver drives, with the trait that it borrows."""
+        persona, borrowed = self.context.persona(persona_of(planned)), borrowed_of(planned)
+        if borrowed is None:
+            return persona
+        return with_trait_of(persona, borrowed.trait, self.context.persona(borrowed.of) if borrowed.of else None)
 
     def driver(self, planned: PlannedMember) -> Driver:
         """The driver itself, without its persona."""
-        sampled = self.context.persona(persona_of(planned)).decisions == "sampled"
+        sampled = self.persona(planned).decisions == "sampled"
         match planned:
             case SumoDriven():
                 return SumoDriver()

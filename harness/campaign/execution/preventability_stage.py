@@ -48,7 +48,7 @@ def carry_out_preventability(
     episodes = arm_tables(folder, of.id).episodes
     failures = episodes[(episodes["error"] == "") & (episodes["ego_failed"] == 1)]
     numbers = [int(episode) for episode in failures["episode"]]
-    conflicts, failed_s = _from_conflict(scene, folder.traces(of.id), numbers, of.seed)
+    conflicts, failed_s = _from_conflict(scene, folder.traces(of.id), numbers, run.context.document.start_seed)
     starts = _from_start(stage, run, scene, numbers)
     rows = []
     for failure in failures.itertuples():
@@ -75,7 +75,7 @@ def carry_out_preventability(
 
 
 def _from_conflict(
-    scene: OpenScene, traces: Path, episodes: Sequence[int], seed: int
+    scene: OpenScene, traces: Path, episodes: Sequence[int], start_seed: int
 ) -> tuple[dict[tuple[int, str], dict[str, Any]], dict[int, float]]:
     """The cells of the verdict from the conflict on, by episode and driver; and when each game failed."""
     reader, step_s, ego = TraceReader(), scene.world.step_s, scene.world.roles[EGO]
@@ -89,7 +89,7 @@ def _from_conflict(
     cells: dict[tuple[int, str], dict[str, Any]] = {}
     for first in range(0, len(collisions), _COLLISIONS_AT_ONCE):
         some = collisions[first : first + _COLLISIONS_AT_ONCE]
-        replay = ConflictReplay(scene, some, seed)
+        replay = ConflictReplay(scene, some, start_seed)
         chances = replay.chances()
         for name, takeovers in replay.takeovers().items():
             for collision, takeover, chance in zip(some, takeovers, chances, strict=True):

@@ -92,7 +92,8 @@ class Regression:
             raise UsageError.of(file, "people", message, "pin the game again")
         persona = read_document(resolve(file, game.ego_persona), Persona)
         drivers = (None, *(_person(file, each) for each in game.people))
-        return game, persona, SeatedArm(name=game.arm, scene=scene, drivers=drivers, seed=game.seed)
+        start_seed = game.seed if game.start_seed is None else game.start_seed
+        return game, persona, SeatedArm(name=game.arm, scene=scene, drivers=drivers, seed=start_seed)
 
 
 def _check_scene(file: Path, hashes: Mapping[str, str], scene: OpenScene) -> None:

@@ -135,11 +135,13 @@ class _ManifestKeeper:
             "personas": [persona.name for persona in campaign.personas],
             "ego_persona": campaign.ego_persona.record(),
             "ego_driver": campaign.ego_driver.recorded if campaign.ego_driver is not None else None,
-            "persona_documents": {each.name: each.record() for each in campaign.personas},
+            "persona_documents": {name: each.record() for name, each in campaign.people.items()},
             "seeds": list(campaign.document.seeds),
             "hashes": dict(campaign.hashes),
             "versions": versions(),
         }
+        if campaign.baseline is not None:
+            self.content["baseline"] = campaign.baseline.name
         if varying:
             self.content["varying_drivers"] = dict(varying)
         if campaign.learned_elsewhere:

@@ -19,7 +19,6 @@ from harness.campaign.plan.stages import (
     Trained,
     TrainedBefore,
     driver_in,
-    persona_of,
 )
 from harness.campaign.storage.manifest import planned
 from harness.campaign.storage.run_folder import MANIFEST, RunFolder
@@ -70,6 +69,11 @@ class RunPlayers:
             policies=policies or policies_of_run(folder.path, document.policies, manifest["hashes"]),
         )
 
+    @property
+    def start_seed(self) -> int:
+        """The seed of the starts of its games."""
+        return self._context.document.start_seed
+
     def arms(self) -> list[AssessmentStage]:
         """The arms in which an ego meets people, with a driver each that this run can make again: none that other arms
         chose or weighed."""
@@ -87,7 +91,7 @@ class RunPlayers:
 
     def ego(self, stage: AssessmentStage) -> SeatedDriver:
         """The ego of an arm. Raises UsageError if it can't be made."""
-        persona, planned = self._context.ego_persona, _member(stage, EGO, episode=0)
+        persona, planned = self._context.ego_persona, self._member(stage, EGO, episode=0)
         if isinstance(planned, External | Reconfigured):
             if self._ego is None or isinstance(planned, Reconfigured) or planned.name:
                 raise UsageError.of(
@@ -99,8 +103,9 @@ class RunPlayers:
 
     def people(self, stage: AssessmentStage, episode: int) -> tuple[SeatedDriver, ...]:
         """Each person of an arm in one episode. Raises UsageError if a policy can't be read."""
-        members = (_member(stage, player, episode) for player in range(1, len(self.scene.world.roles)))
-        return tuple(self._seated(each, self._context.persona(persona_of(each))) for each in members)
+        members = (self._member(stage, player, episode) for player in range(1, len(self.scene.world.roles)))
+        players = PlayerFactory(context=self._context, scene=self.scene)
+        return tuple(self._seated(each, players.persona(each)) for each in members)
 
     def _seated(self, planned: PlannedMember, persona: Persona) -> SeatedDriver:
         players = PlayerFactory(context=self._context, scene=self.scene)
@@ -112,15 +117,14 @@ class RunPlayers:
             policy = players.policy_folder(planned)
         return SeatedDriver(driver=players.driver(planned), persona=persona, policy=policy)
 
-
-def _member(stage: AssessmentStage, player: int, episode: int) -> PlannedMember:
-    """Who of a mixture drives as a player in an episode; the driver itself where there is one."""
-    planned = driver_in(stage.ego, 0) if player == EGO else driver_in(stage.non_ego, player - 1)
-    if isinstance(planned, FixedMixture):
-        return planned.members[member_in_episode(planned.shares, player, stage.seed, episode)]
-    assert planned is not None
-    assert not isinstance(planned, BestOf | EquilibriumMixture), "left out of `arms`"
-    return planned
+    def _member(self, stage: AssessmentStage, player: int, episode: int) -> PlannedMember:
+        """Who of a mixture drives as a player in an episode; the driver itself where there is one."""
+        planned = driver_in(stage.ego, 0) if player == EGO else driver_in(stage.non_ego, player - 1)
+        if isinstance(planned, FixedMixture):
+            return planned.members[member_in_episode(planned.shares, player, self.start_seed, episode)]
+        assert planned is not None
+        assert not isinstance(planned, BestOf | EquilibriumMixture), "left out of `arms`"
+        return planned
 
 
 def policies_of_run(run: Path, written: str | None, hashes: Mapping[str, str]) -> Path | None:

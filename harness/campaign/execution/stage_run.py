@@ -85,7 +85,7 @@ def run_context_of(
         folder=folder,
         document=campaign.document,
         ego_persona=campaign.ego_persona,
-        personas={each.name: each for each in campaign.personas},
+        personas=campaign.people,
         ego_driver=campaign.ego_driver,
         other_egos=campaign.other_egos,
         policies=campaign.policies,

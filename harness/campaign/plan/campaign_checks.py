@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TypeAlias
 
@@ -11,6 +11,7 @@ from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.plan.strategy_stages import crossplay_name
 from harness.config.campaign import LEARNED, SUMO, Campaign, Rounds
 from harness.config.toml_reading import nearest
+from harness.config.traits import UNREAD, PersonTraits
 from harness.errors import Problem, UsageError
 from harness.evaluation.strategies import NaiveEgo, RobustEgo, strategy_name
 
@@ -28,12 +29,17 @@ def check_people(file: Path, document: Campaign, people: int) -> None:
 
 
 def check_names(
-    file: Path, document: Campaign, personas: Sequence[str], tunable: bool = False, lapsing: Collection[str] = ()
+    file: Path,
+    document: Campaign,
+    personas: Sequence[str],
+    tunable: bool = False,
+    traits: PersonTraits = UNREAD,
 ) -> None:
-    """Raises UsageError for every name that refers to nothing, or to two things; `tunable`, `lapsing` as in `plan`."""
-    _refuse(file, (*_personas(document, personas), *_other_egos(document)))
+    """Raises UsageError for every name that refers to nothing, or to two things, and for a baseline with which nothing
+    can be compared; `tunable`, `traits` as in `plan`."""
+    _refuse(file, (*_personas(document, personas, traits), *_other_egos(document), *_baseline(traits)))
     _refuse(file, _arms(document, personas, tunable))
-    _refuse(file, _stages(document, personas, tunable, lapsing))
+    _refuse(file, _stages(document, personas, tunable, traits))
 
 
 def _refuse(file: Path, found: _Found | Sequence[tuple[str, str, str]]) -> None:
@@ -59,7 +65,7 @@ def _people(document: Campaign, people: int) -> _Found:
         yield "training.games", message, f"give at least {people}"
 
 
-def _personas(document: Campaign, personas: Sequence[str]) -> _Found:
+def _personas(document: Campaign, personas: Sequence[str], traits: PersonTraits) -> _Found:
     named = {f"population[{k}].shares": list(each.shares) for k, each in enumerate(document.population)}
     named |= {f"crowd[{k}].personas": list(dict.fromkeys(each.personas)) for k, each in enumerate(document.crowd)}
     named |= {"retraining.against": document.retraining.against, "rounds.personas": document.rounds.personas}
@@ -67,16 +73,22 @@ def _personas(document: Campaign, personas: Sequence[str]) -> _Found:
         for name in names:
             if name not in personas:
                 yield key, f"there is no persona {name!r}", nearest(name, personas)
-    taken = list(personas)
+    taken = [*personas, traits.baseline]
     mixed = [(f"population[{k}]", each.name) for k, each in enumerate(document.population)]
     mixed += [(f"crowd[{k}]", each.name) for k, each in enumerate(document.crowd)]
     for table, name in mixed:
         if name in taken:
-            message = f"{name!r} is the name of a persona, or of another population or crowd"
+            message = f"{name!r} is the name of a persona or of the baseline, or of another population or crowd"
             yield f"{table}.name", message, "give it another name"
         taken.append(name)
     if len(set(document.retraining.against)) < len(document.retraining.against):
         yield "retraining.against", "a persona is named twice", "name each once"
+
+
+def _baseline(traits: PersonTraits) -> _Found:
+    if traits.baseline and not traits.differing:
+        message = f"no persona of the campaign differs from {traits.baseline!r}: there is nothing to compare"
+        yield "attribution.baseline", message, "name another persona, or leave out [attribution]"
 
 
 def _other_egos(document: Campaign) -> _Found:
@@ -107,10 +119,10 @@ def _arms(document: Campaign, personas: Sequence[str], tunable: bool) -> _Found:
             yield "best_response.arms", message, nearest(name, pairs)
 
 
-def _stages(document: Campaign, personas: Sequence[str], tunable: bool, lapsing: Collection[str]) -> _Found:
+def _stages(document: Campaign, personas: Sequence[str], tunable: bool, traits: PersonTraits) -> _Found:
     """Stages are named after personas: two of them may have the same name."""
     stages: dict[str, list[str]] = {}
-    for stage in plan(document.model_copy(update={"policies": None}), personas, tunable, lapsing):
+    for stage in plan(document.model_copy(update={"policies": None}), personas, tunable, traits):
         stages.setdefault(stage.id, []).append(stage.persona)
     clashes = {tuple(sorted(filter(None, of))): name for name, of in stages.items() if len(of) > 1}
     for of, name in clashes.items():

@@ -6,6 +6,8 @@
 | 1 | for each persona: train `<persona>` against the naive ego; assess `<persona>_alone`, `naive_vs_<persona>` |
 | 2 | for each persona: train `retrained_<persona>`; assess `retrained_vs_<persona>`, `retrained_alone_<persona>` |
 
+The baseline of `[attribution]` is trained in round 1 as a persona is (`attribution_arms` has its arms).
+
 A persona drives in every place of the non-egos, and in one at a time without the ego (`<persona>_alone`). A persona
 with `[attention]` is also assessed alone with its eyes on the road (`<persona>_attentive_alone`). A population or crowd
 is an opponent like a persona, but its members are trained as personas. `robust` is the ego retrained against
@@ -23,6 +25,7 @@ from harness.campaign.plan.strategy_stages import SeedStages, ego_learns
 from harness.config.campaign import Campaign
 from harness.evaluation.competence import Question, ResearchQuestion
 from harness.evaluation.strategies import (
+    ATTENTIVE,
     NAIVE_ALONE,
     NAIVE_VS_SUMO,
     Arm,
@@ -49,7 +52,8 @@ def plan_paper_rounds(of: SeedStages, personas: Sequence[str]) -> list[Stage]:
                 seed=of.seed, persona="", strategy=naive, opponent=beside, initial=None, alone_share=alone_share
             )
         )
-    stages += [of.training(PersonaNonEgo(persona=name), of.side(NaiveEgo()), persona=name) for name in personas]
+    trained = dict.fromkeys(filter(None, (*personas, of.traits.baseline)))
+    stages += [of.training(PersonaNonEgo(persona=name), of.side(NaiveEgo()), persona=name) for name in trained]
     stages += [of.assessment(NAIVE_ALONE), of.assessment(NAIVE_VS_SUMO)]
     for name in (*personas, *of.campaign.mixed_people):
         retrained = RetrainedEgo(against=name)
@@ -57,8 +61,8 @@ def plan_paper_rounds(of: SeedStages, personas: Sequence[str]) -> list[Stage]:
             stages.append(of.training(retrained, of.side(PersonaNonEgo(persona=name)), persona=name))
         if name in personas:
             stages.append(of.assessment(persona_alone(name), persona=name))
-        if name in of.lapsing:
-            stages.append(of.assessment(persona_alone(name, attentive=True), persona=name))
+        if name in of.traits.lapsing:
+            stages.append(of.assessment(persona_alone(name, ATTENTIVE), persona=name))
         stages.append(of.assessment(against_persona(NaiveEgo(), name), persona=name))
         stages += _round_2_arms(of, retrained) if learns else []
     return stages

@@ -1,29 +1,31 @@
-"""The plan of a campaign: the paper's rounds, the rounds after them, best responses, and the cross-play.
+"""The plan of a campaign: the paper's rounds, the rounds after them, best responses, cross-play and attribution.
 
 `plan` is the only entry: everything else in this package is a part of it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 
+from harness.campaign.plan.attribution_arms import plan_attribution
 from harness.campaign.plan.iterated_rounds import PersonaRounds, persona_rounds, plan_best_responses
 from harness.campaign.plan.paper_rounds import plan_paper_rounds, plan_robust, plan_searches
 from harness.campaign.plan.stages import AssessmentStage, PreventabilityStage, Stage, TrainingStage
 from harness.campaign.plan.strategy_stages import SeedStages, crossplay_name, ego_learns
 from harness.config.campaign import Campaign
+from harness.config.traits import UNREAD, PersonTraits
 from harness.evaluation.strategies import EgoStrategy, OtherEgo, ReconfiguredEgo, RetrainedEgo, RobustEgo
 
 
 def plan(
-    campaign: Campaign, personas: Sequence[str], tunable: bool = False, lapsing: Collection[str] = ()
+    campaign: Campaign, personas: Sequence[str], tunable: bool = False, traits: PersonTraits = UNREAD
 ) -> list[Stage]:
     """Every stage of a campaign with these personas, each after those it needs.
 
-    `tunable`: the campaign's ego is external and has tunable parameters. `lapsing`: the personas whose
-    attention lapses. A campaign with a folder of policies trains nothing but best responses.
+    `tunable`: the campaign's ego is external and has tunable parameters. `traits`: those of the personas. A
+    campaign with a folder of policies trains nothing but best responses.
     """
-    seeds = [SeedStages(campaign=campaign, seed=seed, lapsing=lapsing) for seed in campaign.seeds]
+    seeds = [SeedStages(campaign=campaign, seed=seed, traits=traits) for seed in campaign.seeds]
     stages = [stage for of in seeds for stage in _plan_seed(of, personas, tunable)]
     if campaign.policies is None:
         return stages
@@ -39,6 +41,7 @@ def _plan_seed(of: SeedStages, personas: Sequence[str], tunable: bool) -> list[S
     stages += _plan_crossplay(of, rounds)
     stages += _plan_responses(of, rounds, stages)
     stages += _plan_preventability(of.campaign, judged)
+    stages += plan_attribution(of)
     return list(dict.fromkeys(stages))
 
 

@@ -13,7 +13,15 @@ from itertools import chain
 from typing import ClassVar, TypeAlias
 
 from harness.evaluation.competence import AloneBound
-from harness.evaluation.strategies import Arm, BestResponse, ReconfiguredEgo, Strategy, player_of, strategy_name
+from harness.evaluation.strategies import (
+    Arm,
+    BestResponse,
+    Borrowed,
+    ReconfiguredEgo,
+    Strategy,
+    player_of,
+    strategy_name,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,8 +50,8 @@ class Trained:
     stage: str
     persona: str = ""
     """The persona with which it drives; empty: the ego's own."""
-    attentive: bool = False
-    """Whether it drives without the persona's lapses of attention."""
+    borrowed: Borrowed | None = None
+    """The trait with which it drives that is not the persona's own."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,8 +61,8 @@ class TrainedBefore:
     stage: str
     persona: str = ""
     """The persona with which it drives; empty: the ego's own."""
-    attentive: bool = False
-    """Whether it drives without the persona's lapses of attention."""
+    borrowed: Borrowed | None = None
+    """The trait with which it drives that is not the persona's own."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,6 +117,11 @@ def persona_of(driver: PlannedDriver) -> str:
             return persona
         case _:
             return ""
+
+
+def borrowed_of(driver: PlannedDriver) -> Borrowed | None:
+    """The trait with which a driver drives that is not its persona's own."""
+    return driver.borrowed if isinstance(driver, Trained | TrainedBefore) else None
 
 
 def description(driver: PlannedDriver) -> str:

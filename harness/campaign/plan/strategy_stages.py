@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import PurePath
@@ -27,8 +27,10 @@ from harness.campaign.plan.stages import (
 )
 from harness.config.campaign import LEARNED, SUMO, Campaign
 from harness.config.training import ATTENTIVE_SHARE, Training
+from harness.config.traits import PAYOFF, UNREAD, PersonTraits
 from harness.evaluation.strategies import (
     Arm,
+    Borrowed,
     EgoStrategy,
     NaiveEgo,
     NonEgoStrategy,
@@ -62,8 +64,7 @@ class SeedStages:
 
     campaign: Campaign
     seed: int
-    lapsing: Collection[str] = ()
-    """The personas whose attention lapses."""
+    traits: PersonTraits = UNREAD
     gates: dict[EgoStrategy | NonEgoStrategy, tuple[EquilibriumGate, ...]] = field(default_factory=dict)
     """Of the strategies after round 2: the gates before their trainings."""
 
@@ -121,8 +122,11 @@ class SeedStages:
                 return Reconfigured(stage=stage_id(strategy_name(strategy), self.seed))
             case NaiveEgo() if not ego_learns(self.campaign):
                 return SumoDriven() if self.campaign.ego.driver == SUMO else External()
-            case PersonaNonEgo(persona=persona, attentive=attentive):
-                return replace(self._learned(replace(strategy, attentive=False), persona), attentive=attentive)
+            case PersonaNonEgo(persona=persona, borrowed=Borrowed(trait=trait, of=of) as borrowed):
+                policy = PersonaNonEgo(persona=of) if trait == PAYOFF else replace(strategy, borrowed=None)
+                return replace(self._learned(policy, persona), borrowed=borrowed)
+            case PersonaNonEgo(persona=persona):
+                return self._learned(strategy, persona)
             case _:
                 return self._learned(strategy)
 

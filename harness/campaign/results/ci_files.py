@@ -42,7 +42,12 @@ def write_ci_files(
         "exit_code": result.exit_code,
         "acceptance": [_record(check) for check in checks or ()],
         "verdicts": [
-            {"persona": persona, **{name: getattr(verdict, name) for name in ("question", "label", "sentence")}}
+            {
+                "persona": persona,
+                **{name: getattr(verdict, name) for name in ("question", "label", "sentence")},
+                "about": verdict.about.value if verdict.about is not None else "",
+                "planned_tests": verdict.planned_tests,
+            }
             for persona, verdict, _ in verdicts
         ],
         "failed_stages": list(result.failed_stages),

@@ -24,11 +24,12 @@ def compare_runs(before: Path, after: Path, page: Path) -> list[ComparedRow]:
     manifests = [folder.manifest() for folder in folders]
     games = [episodes_of(folder) for folder in folders]
     scenes = [_scene(manifest) for manifest in manifests]
-    same_scene = bool(scenes[0]) and scenes[0] == scenes[1]
+    first, second = (manifest["seeds"][0] for manifest in manifests)  # starts are drawn from them
+    same_starts = bool(scenes[0]) and scenes[0] == scenes[1] and first == second
     significance = manifests[1]["campaign"]["assessment"]["significance"]
-    rows = compared_rows(differences_of(games[0], games[1], same_scene), significance)
+    rows = compared_rows(differences_of(games[0], games[1], same_starts), significance)
     runs = list(zip((str(before), str(after)), manifests, strict=True))
-    text = render_comparison(runs, rows, same_scene=same_scene, significance=significance)
+    text = render_comparison(runs, rows, same_starts=same_starts, significance=significance)
     write_atomically(page, text.encode())
     return rows
 

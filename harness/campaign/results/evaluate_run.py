@@ -10,27 +10,23 @@ import pandas as pd
 
 from harness.campaign.plan.stages import AssessmentStage, TrainingStage, stage_id
 from harness.campaign.results.matchups import matchups_of
+from harness.campaign.results.population_rows import by_who_drove
 from harness.campaign.results.read_run import ReadRun
-from harness.campaign.results.realism_gate import declared_of, questions_of
+from harness.campaign.results.realism_gate import declared_of, is_played, questions_of
+from harness.campaign.results.run_traits import failures_by_trait
 from harness.campaign.storage.learned import judged
 from harness.campaign.storage.manifest import is_tuned
-from harness.config.campaign import Campaign
-from harness.evaluation.columns import TABLES
 from harness.evaluation.comparisons.acceptance_checks import Evidence, judge
 from harness.evaluation.comparisons.comparison import compare, games_by_arm
+from harness.evaluation.comparisons.over_trainings import compare_over_trainings
 from harness.evaluation.comparisons.preventability import count_prevented
 from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.competence import Goals, goals_alone
 from harness.evaluation.game_theory.findings import GameFindings, find
-from harness.evaluation.people import people_in
 from harness.evaluation.realism import OF_DRIVERS, OF_RIDERS, OF_WALKERS, HumanFigure, realism
-from harness.evaluation.strategies import Arm, NaiveEgo, ReconfiguredEgo, RetrainedEgo, against_persona
-from harness.evaluation.tables import joined, table_of
-from harness.game.initial_state import member_in_episode
-from harness.game.roles import NON_EGO
+from harness.evaluation.strategies import Arm
+from harness.evaluation.tables import table_of
 from harness.reports.run_tables import RunTables
-
-_SUMMARY_COLUMNS = [name for name in TABLES["populations"] if name not in ("arm", "population", "seed", "persona")]
 
 
 def evaluated(run: ReadRun) -> RunTables:
@@ -42,13 +38,16 @@ def evaluated(run: ReadRun) -> RunTables:
         counts = count_prevented(run.reference_drivers, run.episodes)
         prevented = {"reference_drivers": run.reference_drivers, "preventability": counts}
     found = realism(run.conduct, _arms(run), declared_of(run), _figures_of_people(run))
+    asked, significance = questions_of(run, found), run.campaign.assessment.significance
+    played = [each for each in asked if is_played(each, run)]
     tables = RunTables(
         manifest=manifest,
         arms=_arms(run),
         strategies={stage.name: stage.strategy for stage in run.stages if isinstance(stage, TrainingStage)},
         episodes=run.episodes,
         summary=summarise(run.episodes),
-        comparisons=compare(questions_of(run, found), run.episodes, run.campaign.assessment.significance),
+        comparisons=compare(played, run.episodes, significance, planned=len(asked)),
+        over_trainings=compare_over_trainings(asked, run.episodes, significance),
         training=_with_ends(run.training, entries),
         reconfiguration=run.reconfiguration,
         manoeuvres=run.manoeuvres,
@@ -57,10 +56,11 @@ def evaluated(run: ReadRun) -> RunTables:
         game=_game(run),
         non_ego_drives=_people_drive(run),
         populations=by_who_drove(run.campaign, run.episodes),
+        **failures_by_trait(run),
         **prevented,
     )
-    asked = run.campaign.acceptance
-    if asked is None:
+    acceptance = run.campaign.acceptance
+    if acceptance is None:
         return tables
     evidence = Evidence(
         arms=tables.arms,
@@ -71,13 +71,15 @@ def evaluated(run: ReadRun) -> RunTables:
         preventability=tables.preventability if run.reference_drivers is not None else None,
     )
     personas = [*run.manifest["personas"], *run.campaign.mixed_people]
-    return replace(tables, acceptance=judge(asked.bounds, asked.ego, personas, run.campaign.seeds, evidence))
+    return replace(tables, acceptance=judge(acceptance.bounds, acceptance.ego, personas, run.campaign.seeds, evidence))
 
 
 def csv_tables(run: ReadRun, tables: RunTables) -> dict[str, pd.DataFrame]:
     """The tables that the run folder gets, by the names of their files."""
-    names = ["episodes", "training", "summary", "comparisons", "causes", "manoeuvres", "realism"]
+    names = ["episodes", "training", "summary", "comparisons", "causes", "manoeuvres", "realism", "undecided"]
+    names += ["attribution"] if run.campaign.attribution is not None else []
     names += ["reference_drivers", "preventability"] if run.reference_drivers is not None else []
+    names += ["over_trainings"] if len(tables.over_trainings) else []
     names += ["populations"] if run.campaign.population else []
     names += ["reconfiguration"] if is_tuned(run.manifest) else []
     found = {"conduct": run.conduct} | {name: getattr(tables, name) for name in names}
@@ -119,25 +121,3 @@ def _game(run: ReadRun) -> GameFindings | None:
         return None
     significance = run.campaign.assessment.significance
     return find(game.pairings, game.responses, game.training_personas, run.episodes, significance)
-
-
-def by_who_drove(campaign: Campaign, episodes: pd.DataFrame) -> pd.DataFrame:
-    """A row for each arm against a population, seed and persona that drove in it, the table `populations`. With several
-    people, the personas in their places.
-
-    The draw is repeated here: it depends on the place, the arm's seed and the episode only.
-    """
-    frames = []
-    for population in campaign.population:
-        name, names, shares = population.name, list(population.shares), list(population.shares.values())
-        egos = (NaiveEgo(), RetrainedEgo(against=name), ReconfiguredEgo(against=name))
-        for arm in [against_persona(ego, name).name for ego in egos]:
-            games = episodes[episodes["arm"] == arm]
-            players = range(NON_EGO, NON_EGO + len(people_in(games.columns)))
-            drivers = [
-                ", ".join(names[member_in_episode(shares, player, int(seed), int(episode))] for player in players)
-                for seed, episode in zip(games["seed"], games["episode"], strict=True)
-            ]
-            rows = summarise(games.assign(persona=drivers)).sort_values(["seed", "persona"], kind="stable")
-            frames.append(rows[["arm", "seed", "persona", *_SUMMARY_COLUMNS]].assign(population=name))
-    return joined("populations", frames)

@@ -25,7 +25,7 @@ def declared_of(run: ReadRun) -> dict[str, dict[str, str]]:
 
 
 def questions_of(run: ReadRun, realism: pd.DataFrame) -> list[Question]:
-    """The questions whose arms are finished, each with what its person does that people do not, if the campaign asks.
+    """The planned questions, each with what its person does that people do not, if the campaign asks.
 
     `realism` is the table of this name. Of a population or crowd, each persona is asked.
     """
@@ -33,8 +33,12 @@ def questions_of(run: ReadRun, realism: pd.DataFrame) -> list[Question]:
     return [
         replace(question, unlike_people=_clauses(run.campaign, question, realism) if asked else "")
         for question in questions(run.campaign, run.manifest["personas"], is_tuned(run.manifest))
-        if {stage_id(arm, question.seed) for arm in (question.baseline, question.treatment)} <= run.done
     ]
+
+
+def is_played(question: Question, run: ReadRun) -> bool:
+    """Whether the arms of a question are finished."""
+    return {stage_id(arm, question.seed) for arm in (question.baseline, question.treatment)} <= run.done
 
 
 def _clauses(campaign: Campaign, question: Question, realism: pd.DataFrame) -> str:

@@ -29,27 +29,36 @@ TAKE_TURNS = 20  # games of an arm and seed in turn, so that a page without room
 
 
 def recorded_games(
-    episodes: pd.DataFrame, arms: Mapping[str, Arm], traces: Callable[[str, int], Path], scene: OpenScene
+    episodes: pd.DataFrame,
+    arms: Mapping[str, Arm],
+    traces: Callable[[str, int], Path],
+    scene: OpenScene,
+    examples: Sequence[tuple[str, int, int]] = (),
 ) -> Iterator[GameTracks]:
     """Every played game, those to watch first at the front. Each is read when the iterator reaches it.
 
     Games with a replay come first, worst first, in turns of `TAKE_TURNS` per arm and seed. Each is followed by the game
     of the same episode that it is compared with; then the rest. `arms` are the arms by name; `traces` gives the traces
-    file of an arm and seed.
+    file of an arm and seed. `examples`: arm, seed and episode of games that the page refers to, which come before all
+    others.
     """
     reader = TraceReader()
-    for game in watching_order(episodes, arms).itertuples():
+    for game in watching_order(episodes, arms, examples).itertuples():
         trace = reader.read(traces(game.arm, game.seed), game.episode)
         if not trace.empty:
             yield tracks_of(trace, scene, game)
 
 
-def watching_order(episodes: pd.DataFrame, arms: Mapping[str, Arm]) -> pd.DataFrame:
-    """The rows of `episodes` that were played, in the order of `recorded_games`."""
+def watching_order(
+    episodes: pd.DataFrame, arms: Mapping[str, Arm], examples: Sequence[tuple[str, int, int]] = ()
+) -> pd.DataFrame:
+    """The rows of `episodes` that were played, in the order of `recorded_games`. Games against a person with another
+    person's trait are the last, but for examples."""
     played = episodes[(episodes["error"] == "") & (episodes["ego_outcome"] != "error")]
     rows = {(game.arm, game.seed, game.episode): game.Index for game in played.itertuples()}
-    order: dict[Any, None] = {}
-    chosen = worst_first(choose_games(played))
+    order: dict[Any, None] = dict.fromkeys(rows[game] for game in examples if game in rows)
+    own = played[~played["arm"].isin([name for name, arm in arms.items() if arm.is_of_a_trait])]
+    chosen = worst_first(choose_games(own))
     turn = chosen.groupby(["arm", "seed"]).cumcount() // TAKE_TURNS
     turn[judged_outcomes(chosen) == "goal"] = 0
     for game in chosen.loc[turn.sort_values(kind="stable").index].itertuples():
@@ -58,6 +67,7 @@ def watching_order(episodes: pd.DataFrame, arms: Mapping[str, Arm]) -> pd.DataFr
             counterpart = rows.get((each.name, game.seed, game.episode))
             if counterpart is not None:
                 order[counterpart] = None
+    order |= dict.fromkeys(worst_first(own).index)
     order |= dict.fromkeys(worst_first(played).index)
     return played.loc[list(order)]
 

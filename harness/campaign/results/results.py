@@ -19,6 +19,7 @@ from harness.campaign.results.shown_result import shown_result, verdicts_of
 from harness.campaign.results.shown_work import doing, progress_bar, say
 from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.run_log import LOGGER
+from harness.evaluation.comparisons.attribution import examples
 from harness.evaluation.tables import write_csv
 from harness.evaluation.trace_file import TraceReader
 from harness.evaluation.worst_first import worst_first
@@ -38,9 +39,11 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     for name, table in csv_tables(run, tables).items():
         write_csv(table, folder.path / f"{name}.csv")
     write_model_cards(folder, tables.manifest, run.policies, tables.summary, tables.realism)
-    tables = replace(tables, replays=_write_replays(folder, run.scene, tables.episodes, console))
+    tables = replace(tables, replays=_write_replays(folder, run.scene, tables.of_own_traits(tables.episodes), console))
     with doing(console, "writing the report"):
-        games = recorded_games(tables.episodes, tables.arms, folder.traces_of_arm, run.scene)
+        games = recorded_games(
+            tables.episodes, tables.arms, folder.traces_of_arm, run.scene, examples(tables.attribution)
+        )
         page = render_page(tables, games, scene_drawing(run.scene))
     write_atomically(folder.path / "report.html", page.encode())
     verdicts = verdicts_of(run.campaign, tables)

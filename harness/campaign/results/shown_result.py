@@ -57,7 +57,7 @@ def _lines(campaign: Campaign, tables: RunTables, verdicts: Verdicts) -> Iterato
         yield ShownLine(text=f"{persona}, {verdict.question}: {verdict.label}", style=_STYLES[verdict.tone])
         is_compared = verdict.question == "RQ2" and tables.asked("RQ2", persona)
         harm = map(as_sentence, harm_of(persona, tables).values()) if is_compared else ()
-        for sentence in filter(None, (verdict.sentence, *causes, verdict.speed, *harm)):
+        for sentence in filter(None, (verdict.sentence, *causes, verdict.speed, *harm, verdict.scope)):
             yield ShownLine(text=f"  {sentence}")
     for step in to_learn(tables):
         yield ShownLine(text=f"To try: {plain(step.sentence)}")

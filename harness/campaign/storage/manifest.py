@@ -17,6 +17,7 @@ from harness.config.campaign import Campaign, CampaignName, Seed
 from harness.config.persona import Persona
 from harness.config.scene import Name
 from harness.config.toml_reading import Document
+from harness.config.traits import PersonTraits, traits_of
 from harness.errors import UsageError
 
 FORMAT = 1
@@ -79,6 +80,9 @@ class Manifest(_Record):
     stages: dict[Text, StageEntry]
     ego_persona: Persona
     persona_documents: dict[Name, Persona]
+    """Of the personas and the baseline."""
+    baseline: Name | None = None
+    """The name of the campaign's baseline; None: it has none."""
     varying_drivers: dict[Text, Text] = Field({})
     """Drivers that decide otherwise when a game is played again, with the difference in words."""
     learned_elsewhere: dict[Text, Text] = Field({})
@@ -88,6 +92,10 @@ class Manifest(_Record):
     def _is_consistent(self) -> Manifest:
         """The names of stages become names of files; reports and model cards rely on the rest."""
         problems = [] if "harness" in self.versions else ["versions.harness: is missing"]
+        named = {"personas": self.personas, "baseline": [self.baseline] if self.baseline is not None else []}
+        for key, names in named.items():
+            unknown = [name for name in names if name not in self.persona_documents]
+            problems += [f"{key}: there is no document of persona {name!r}" for name in unknown]
         people = {"", *self.persona_documents, *self.campaign.mixed_people}
         for name, entry in self.stages.items():
             if name != stage_id(entry.name, entry.seed) or not _STAGE.fullmatch(name):
@@ -129,8 +137,13 @@ def checksum_of_content(manifest: Mapping[str, Any]) -> str:
 def planned(manifest: Mapping[str, Any]) -> list[Stage]:
     """Every stage of the plan of a run, each after those it needs."""
     campaign = Campaign.model_validate(manifest["campaign"], strict=False)
-    lapsing = [name for name, document in manifest["persona_documents"].items() if document.get("attention")]
-    return plan(campaign, manifest["personas"], is_tuned(manifest), lapsing)
+    return plan(campaign, manifest["personas"], is_tuned(manifest), traits_in(manifest))
+
+
+def traits_in(manifest: Mapping[str, Any]) -> PersonTraits:
+    """What the plan of a run knows of the documents of its personas."""
+    people = {name: Persona.from_record(each) for name, each in manifest["persona_documents"].items()}
+    return traits_of([people[name] for name in manifest["personas"]], people.get(manifest.get("baseline")))
 
 
 def is_tuned(manifest: Mapping[str, Any]) -> bool:

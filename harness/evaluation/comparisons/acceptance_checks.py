@@ -182,6 +182,7 @@ def _arms_against(subject: Subject, evidence: Evidence) -> list[str]:
         if arm.ego == subject.ego
         and isinstance(arm.non_ego, PersonaNonEgo)
         and arm.non_ego.persona == subject.persona
+        and arm.non_ego.borrowed is None
         and arm.best_response_of is None
     ]
     return arms or [against_persona(subject.ego, subject.persona).name]

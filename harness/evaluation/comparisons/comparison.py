@@ -17,13 +17,16 @@ bystander, fails without the ego, and of the follower's strongest braking. Their
 The same row also contains: the two-sided 95 % t interval of the mean difference; the effect
 size (Cohen's d_z, mean / standard deviation of the differences); for failures McNemar's exact test,
 one-tailed in the direction of H1 like the t-test (of the pairs in which exactly one game failed, is H1 right
-in more than half? Binomial with p = 1/2; 1 when there are no such pairs); and Holm's correction over all
-t-tests of the table, which is that of the whole campaign. Tests of harm are a family of their own: they do not blunt
-the questions, and the questions do not hide harm.
+in more than half? Binomial with p = 1/2; 1 when there are no such pairs).
+
+Every row is about one trained pair. The t-tests of failures are the primary tests, and Holm's correction is over all
+that the campaign plans (`evaluation.planned_tests`), whatever comes of them: a question that is not answered, not
+played or has no t statistic counts as a test with p = 1. Tests of the average speed are secondary and not corrected.
+Those of harm to others are secondary, and a family of their own.
 
 A question whose players were not shown to drive the scene alone, or whose person does not drive as people do
 (`competence.gate_of`), is not answered: its rows have pairs and a mean difference, which describe the games, and no
-test. They are not in Holm's family.
+test.
 
 `rejects_h0` is the paper's criterion, the uncorrected p-value. The verdict is stricter: see `Verdict`.
 """
@@ -39,8 +42,9 @@ import scipy  # loads `scipy.stats` at its first use: workers do without
 
 from harness.evaluation.columns import TABLES
 from harness.evaluation.competence import Question, ResearchQuestion, Verdict, gate_of
+from harness.evaluation.planned_tests import PRIMARY, About
 from harness.evaluation.tables import typed
-from harness.game.arrays import BoolArray, FloatArray
+from harness.game.arrays import FloatArray
 
 CONFIDENCE = 0.95
 """The confidence of every interval in the tables; it does not depend on the campaign's significance."""
@@ -62,19 +66,24 @@ HARM = frozenset({"person_failure", "bystander_failure", "follower_braking"})
 """Harm to others than the ego."""
 
 
-def compare(questions: Iterable[Question], episodes: pd.DataFrame, significance: float) -> pd.DataFrame:
+def compare(
+    questions: Iterable[Question], episodes: pd.DataFrame, significance: float, planned: int | None = None
+) -> pd.DataFrame:
     """A row for each question and metric, in that order, the table `comparisons`.
+
+    `planned` is the number of questions that the campaign plans; left out: that of these.
 
     `episodes` has the columns of episodes.csv: arm, seed, episode, ego_outcome, error, and the metrics'.
     Games are paired by seed and episode. A pair is left out, and counted in `pairs_left_out`, when either
     game errored, has an empty value, or is missing. A value that can't be computed is NaN. Where all
     differences are equal, or there are fewer than two pairs, there is no test: t, p-values, interval and effect
-    size are NaN, the row is not in Holm's family, and `rejects_h0` is false. The same holds for a question whose
-    players miss a bound of `Question.alone`, or whose person is unlike people.
+    size are NaN, and `rejects_h0` is false. The same holds for a question whose players miss a bound of
+    `Question.alone`, or whose person is unlike people.
 
     Raises ValueError when an arm has two games for one episode.
     """
-    games = games_by_arm(episodes)
+    questions, games = list(questions), games_by_arm(episodes)
+    planned = len(questions) if planned is None else planned
     rows = [
         _row(question, metric, games, gate_of(question, games))
         for question in questions
@@ -82,21 +91,19 @@ def compare(questions: Iterable[Question], episodes: pd.DataFrame, significance:
         if question.question in signs
     ]
     table = pd.DataFrame(rows, columns=list(TABLES["comparisons"]))
+    is_primary = table["metric"] == PRIMARY
+    table["about"] = About.TRAINED_PAIR.value
+    table["planned_tests"] = is_primary.map({True: planned, False: None})
     table["rejects_h0"] = table["p_value"].astype("float64") < significance
-    return typed(with_verdicts(table, significance, apart=table["metric"].isin(HARM).to_numpy()))
+    is_harm, p_values = table["metric"].isin(HARM).to_numpy(), table["p_value"].to_numpy(dtype=np.float64)
+    table["p_holm"] = holm(np.where(is_primary, p_values, np.nan), planned)
+    table.loc[is_harm, "p_holm"] = holm(p_values[is_harm])
+    return typed(with_verdicts(table, significance))
 
 
-def with_verdicts(
-    table: pd.DataFrame, significance: float, difference: str = "mean_difference", apart: BoolArray | None = None
-) -> pd.DataFrame:
-    """A table with Holm's correction over all of its p-values, and the verdict of each row by its pairs, p-values and
-    difference. A row that has a verdict keeps it: that of a closed gate. The rows `apart` [N] are a family of their
-    own."""
-    p_values = table["p_value"].to_numpy(dtype=np.float64)
-    p_holm, apart = np.empty_like(p_values), np.zeros(len(table), dtype=bool) if apart is None else apart
-    for family in (apart, ~apart):
-        p_holm[family] = holm(p_values[family])
-    table = table.assign(p_holm=p_holm)
+def with_verdicts(table: pd.DataFrame, significance: float, difference: str = "mean_difference") -> pd.DataFrame:
+    """A table with the verdict of each row by its pairs, p-values and difference. A row that has a verdict keeps it:
+    that of a closed gate."""
     verdicts = [
         row["verdict"] or _verdict(row, row[difference], significance).value for row in table.to_dict("records")
     ]
@@ -106,23 +113,35 @@ def with_verdicts(
 def _verdict(row: Mapping[Any, Any], difference: float, significance: float) -> Verdict:
     if row["pairs"] < 2:
         return Verdict.NOT_ENOUGH_PAIRS
-    if np.isnan(row["p_value"]):
+    return verdict_of(row["p_value"], row["p_holm"], difference, significance)
+
+
+def verdict_of(p_value: float, p_holm: float, difference: float, significance: float) -> Verdict:
+    """The verdict of a test. NaN as `p_value`: there is no test; as `p_holm`: it is secondary."""
+    if np.isnan(p_value):
         return Verdict.NO_DIFFERENCE if difference == 0 else Verdict.ALL_EQUAL
-    if row["p_holm"] < significance:
-        return Verdict.SIGNIFICANT
-    return Verdict.BEFORE_HOLM_ONLY if row["p_value"] < significance else Verdict.NOT_SIGNIFICANT
+    if p_value >= significance:
+        return Verdict.NOT_SIGNIFICANT
+    if np.isnan(p_holm):
+        return Verdict.SECONDARY
+    return Verdict.SIGNIFICANT if p_holm < significance else Verdict.BEFORE_HOLM_ONLY
 
 
-def holm(p_values: FloatArray) -> FloatArray:
-    """Holm's step-down adjusted p-values [N]. NaN means no test: it stays NaN and is not counted.
+def holm(p_values: FloatArray, planned: int | None = None) -> FloatArray:
+    """Holm's step-down adjusted p-values [N] in a family of `planned` tests; left out: N.
+
+    NaN means that a test could not be made. It stays NaN and counts as p = 1, as does each planned test that is not
+    among the p-values.
 
     Source: S. Holm, "A simple sequentially rejective multiple test procedure", Scand. J. Statist. 6 (1979).
     The i-th smallest of m p-values is multiplied by m - i + 1, made no smaller than the previous one, and capped at 1.
     """
     adjusted = np.full(p_values.shape, np.nan)
     tests = np.flatnonzero(~np.isnan(p_values))
+    family = len(p_values) if planned is None else planned
+    assert family >= len(tests), "more tests than planned"
     ascending = tests[np.argsort(p_values[tests], kind="stable")]
-    steps = p_values[ascending] * np.arange(len(ascending), 0, -1)
+    steps = p_values[ascending] * (family - np.arange(len(ascending)))
     adjusted[ascending] = np.minimum(np.maximum.accumulate(steps), 1.0)
     return adjusted
 
@@ -178,10 +197,17 @@ def pairs_of(
 
     Raises ValueError when an arm has two games for one episode.
     """
-    sides = [measured_values(games.get((arm, seed)), columns) for arm in (baseline, treatment)]
-    both = pd.concat(sides, axis=1).to_numpy(dtype=np.float64)
+    both = pairs_by_episode(games, seed, baseline, treatment, columns).to_numpy(dtype=np.float64)
     measured = np.isfinite(both).all(axis=1)
     return both[measured, : len(columns)], both[measured, len(columns) :], int((~measured).sum())
+
+
+def pairs_by_episode(
+    games: Mapping[Any, pd.DataFrame], seed: int, baseline: str, treatment: str, columns: Sequence[str]
+) -> pd.DataFrame:
+    """The columns of the baseline, then those of the treatment, by episode; NaN as in `measured_values`, and where an
+    arm has no such game. Raises ValueError when an arm has two games for one episode."""
+    return pd.concat([measured_values(games.get((arm, seed)), columns) for arm in (baseline, treatment)], axis=1)
 
 
 def measured_values(rows: pd.DataFrame | None, columns: Sequence[str]) -> pd.DataFrame:

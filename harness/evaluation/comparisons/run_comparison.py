@@ -1,7 +1,7 @@
 """Two runs beside each other: did a change make the ego better?
 
-Arms of the same name and training seed are compared. On the same scene, game k has the same start in both runs, so the
-games are compared in pairs; on different scenes there are no pairs, and only the rates are shown.
+Arms of the same name and training seed are compared. On the same scene and with the same first training seed, game k
+has the same start in both runs, so the games are compared in pairs; otherwise only the rates are shown.
 
 | measure | test, two-sided |
 | --- | --- |
@@ -61,7 +61,7 @@ class Difference:
     before: Side
     after: Side
     pairs: int
-    """0 without pairs: on different scenes."""
+    """0 without pairs: the starts differ."""
     mean: float
     """Of after - before, over the pairs; NaN without pairs."""
     low: float
@@ -77,14 +77,14 @@ class Difference:
         return self.measure in RATES
 
 
-def differences_of(before: pd.DataFrame, after: pd.DataFrame, same_scene: bool) -> list[Difference]:
+def differences_of(before: pd.DataFrame, after: pd.DataFrame, same_starts: bool) -> list[Difference]:
     """Every measure of every arm and seed that both runs have, in the order of the first run.
 
     `before` and `after` are tables of games. Raises ValueError where an arm has two games for one episode.
     """
     then, now = games_by_arm(before), games_by_arm(after)
     found = [
-        _difference(measure, column, (then[place], now[place]), same_scene)
+        _difference(measure, column, (then[place], now[place]), same_starts)
         for place in then
         if place in now
         for measure, column in MEASURES.items()

@@ -75,7 +75,7 @@ def gaps(responses: Iterable[Response], episodes: pd.DataFrame, significance: fl
 
     `episodes` has the columns of episodes.csv. A pair is left out, and counted, when either game errored, is missing,
     or lacks the payoff or the ego's outcome. A value that can't be computed is NaN; where all differences are equal
-    there is no test, as in `comparisons.comparison`. Holm's correction is over all gaps of this table.
+    there is no test, as in `comparisons.comparison`. Holm's correction is over all rows of this table.
     There is no test either where a player of the pair misses a bound of `Response.alone`.
 
     Raises ValueError when an arm has two games for one episode.

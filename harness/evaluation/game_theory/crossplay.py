@@ -7,10 +7,12 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from harness.evaluation.comparisons.comparison import (
     games_by_arm,
+    holm,
     mean_cells,
     measured_values,
     paired_t_test,
@@ -80,7 +82,7 @@ def generalisation(
 
     `trained_against` names for each retrained ego the personas it was trained against; the naive ego is not in it.
     `episodes` has the columns of episodes.csv. Pairs and tests are those of `comparisons.comparison`; there is no test
-    where a player, or the naive ego, misses a bound of `Pairing.alone`.
+    where a player, or the naive ego, misses a bound of `Pairing.alone`. Holm's correction is over all rows.
 
     Raises ValueError when an arm has two games for one episode.
     """
@@ -91,7 +93,9 @@ def generalisation(
         for pairing in pairings
         if pairing.ego in trained_against and pairing.persona and pairing.persona not in trained_against[pairing.ego]
     ]
-    return typed(with_verdicts(table_of("generalisation", rows), significance, difference="fewer_failures"))
+    table = table_of("generalisation", rows)
+    table["p_holm"] = holm(table["p_value"].to_numpy(dtype=np.float64))
+    return typed(with_verdicts(table, significance, difference="fewer_failures"))
 
 
 def _generalised(

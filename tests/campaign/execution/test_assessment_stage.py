@@ -110,8 +110,9 @@ def test_arm__a_game_that_is_given_up_is_an_error_and_the_others_are_played(
 
 def test_arm__plays_what_another_worker_leaves_at_last(steady: SeatedArm, whole: Path, tmp_path: Path) -> None:
     """Another worker has the segment from game 3, and ends without it while game 6 is played."""
+    locks, segment = tmp_path / ".stages" / "worker_locks", f"{LABELS['arm']}-seed{LABELS['seed']}.000003"
     with ExitStack() as another:
-        another.enter_context(held_by_worker(tmp_path / ".stages" / "worker_locks", f"{steady.name}-seed1.000003", 0.0))
+        another.enter_context(held_by_worker(locks, segment, 0.0))
         _, played = play(steady, tmp_path, on_start=lambda episode: another.close() if episode == 6 else None)
     assert played == [0, 1, 2, 6, 3, 4, 5]
     assert files(tmp_path) == files(whole)

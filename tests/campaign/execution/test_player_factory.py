@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from harness.campaign.execution.player_factory import PlayerFactory
@@ -13,36 +14,63 @@ from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
+from harness.config.traits import with_trait_of
+from harness.drivers.mixture import Member
 from harness.drivers.policy_file import write_policy
+from harness.evaluation.strategies import ATTENTIVE, Borrowed
+from harness.game.observation_layout import SIZE
 from harness.road.scene.open_scene import open_scene
 from tests.support.policies import some_policy
-from tests.support.tiny import CAREFUL, PAPER_MERGE, TEXTING
+from tests.support.tiny import CAREFUL, PAPER_MERGE, SPEEDY, TEXTING
+
+KINDS = pytest.mark.parametrize("kind", [Trained, TrainedBefore])
 
 
-@pytest.mark.parametrize("kind", [Trained, TrainedBefore])
-def test_player__with_its_eyes_on_the_road_has_no_lapses_and_is_else_the_same(
-    tmp_path: Path, kind: type[Trained] | type[TrainedBefore]
-) -> None:
+@pytest.fixture
+def factory(tmp_path: Path) -> PlayerFactory:
+    """A factory of players with policies of two people, read from the run folder or from that of another run."""
     folder = RunFolder(tmp_path)
-    write_policy(some_policy(), folder.policy("texting-seed1"))
-    persona = read_document(TEXTING, Persona)
+    people = {name: read_document(file, Persona) for name, file in (("texting", TEXTING), ("speedy", SPEEDY))}
+    for seed, name in enumerate(people):
+        write_policy(some_policy(seed=seed), folder.policy(f"{name}-seed1"))
     context = RunContext(
         folder=folder,
         document=Campaign.model_validate({"name": "a", "scene": "b", "personas": ["c"]}),
         ego_persona=read_document(CAREFUL, Persona),
-        personas={"texting": persona},
+        personas=people,
         policies=folder.policy("texting-seed1").parent,
     )
-    factory = PlayerFactory(context=context, scene=open_scene(PAPER_MERGE))
+    return PlayerFactory(context=context, scene=open_scene(PAPER_MERGE))
 
-    def drives(planned: PlannedDriver) -> Persona:
-        player = factory.player(planned)
-        assert player is not None
-        (member,) = player.members
-        return member.persona
 
-    own = kind(stage="texting-seed1", persona="texting")
-    attentive = kind(stage="texting-seed1", persona="texting", attentive=True)
-    assert drives(own) == persona
+def member_of(factory: PlayerFactory, planned: PlannedDriver) -> Member:
+    player = factory.player(planned)
+    assert player is not None
+    (member,) = player.members
+    return member
+
+
+@KINDS
+def test_player__with_its_eyes_on_the_road_has_no_lapses_and_is_else_the_same(
+    factory: PlayerFactory, kind: type[Trained] | type[TrainedBefore]
+) -> None:
+    persona = factory.context.persona("texting")
     assert persona.attention is not None
-    assert drives(attentive) == persona.model_copy(update={"attention": None})
+    assert member_of(factory, kind(stage="texting-seed1", persona="texting")).persona == persona
+    attentive = kind(stage="texting-seed1", persona="texting", borrowed=ATTENTIVE)
+    assert member_of(factory, attentive).persona == persona.model_copy(update={"attention": None})
+
+
+@KINDS
+def test_player__has_one_trait_of_another_persona(
+    factory: PlayerFactory, kind: type[Trained] | type[TrainedBefore]
+) -> None:
+    texting, speedy = (factory.context.persona(name) for name in ("texting", "speedy"))
+    for trait, stage in (("decisions", "texting-seed1"), ("payoff", "speedy-seed1")):
+        borrowed = Borrowed(trait=trait, of="speedy")
+        member = member_of(factory, kind(stage=stage, persona="texting", borrowed=borrowed))
+        assert member.persona == with_trait_of(texting, trait, speedy)
+        actions = [
+            member.driver.decide(np.arange(1), np.zeros((1, SIZE)), np.full((1, 2), noise)).tolist() for noise in (0, 1)
+        ]
+        assert (actions[0] != actions[1]) == (member.persona.decisions == "sampled")

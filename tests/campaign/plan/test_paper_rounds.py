@@ -18,7 +18,9 @@ from harness.campaign.plan.stages import (
     TrainingStage,
     description,
 )
+from harness.config.traits import PersonTraits
 from harness.drivers.policy_file import write_policy
+from harness.evaluation.strategies import ATTENTIVE
 from harness.game.roles import EGO, NON_EGO
 from tests.support.plans import campaign_of, planned, stages_of
 from tests.support.policies import some_policy
@@ -57,10 +59,10 @@ def test_plan__pairings_of_a_learned_ego() -> None:
 
 
 def test_plan__a_persona_with_lapses_is_also_assessed_alone_with_its_eyes_on_the_road() -> None:
-    stages, without = stages_of("anna", "bert", lapsing=["anna"]), stages_of("anna", "bert")
+    stages, without = stages_of("anna", "bert", traits=PersonTraits(lapsing=("anna",))), stages_of("anna", "bert")
     assert stages.keys() - without.keys() == {"anna_attentive_alone"}
     arm = stages["anna_attentive_alone"]
-    assert arm.sides == ((), (Trained(stage="anna-seed1", persona="anna", attentive=True),))
+    assert arm.sides == ((), (Trained(stage="anna-seed1", persona="anna", borrowed=ATTENTIVE),))
     assert stages["anna_alone"].non_ego == (Trained(stage="anna-seed1", persona="anna"),)
 
 
@@ -140,11 +142,15 @@ def test_keys__do_not_depend_on_which_other_personas_there_are(tmp_path: Path, p
     assert turned == more
 
 
-def test_keys__do_not_depend_on_which_other_seeds_there_are(tmp_path: Path) -> None:
+def test_keys__do_not_depend_on_seeds_after_the_first(tmp_path: Path) -> None:
+    """The starts of all arms are drawn from the first seed; trainings depend on their own seed alone."""
     _, keys = planned(tmp_path, seeds=[3])
-    _, more = planned(tmp_path, seeds=[1, 3])
+    _, more = planned(tmp_path, seeds=[3, 1])
     assert {name: more[name] for name in keys} == keys
     assert len(set(more.values())) == len(more)
+    _, after_another = planned(tmp_path, seeds=[1, 3])
+    assert after_another["naive-seed3"] == keys["naive-seed3"]
+    assert after_another["naive_vs_sumo-seed3"] != keys["naive_vs_sumo-seed3"]
 
 
 def test_keys__a_persona_changes_what_it_takes_part_in(tmp_path: Path, personas: list[str]) -> None:

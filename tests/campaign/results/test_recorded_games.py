@@ -5,7 +5,15 @@ import pandas as pd
 import pytest
 
 from harness.campaign.results.recorded_games import TAKE_TURNS, scene_drawing, tracks_of, watching_order
-from harness.evaluation.strategies import NaiveEgo, ReconfiguredEgo, RetrainedEgo, against_persona
+from harness.evaluation.strategies import (
+    Arm,
+    Borrowed,
+    NaiveEgo,
+    PersonaNonEgo,
+    ReconfiguredEgo,
+    RetrainedEgo,
+    against_persona,
+)
 from harness.road.net.network import read_net
 from harness.road.scene.drawing import lane_marks
 from tests.support.traces import game
@@ -47,6 +55,22 @@ def test_order__arms_take_turns_so_that_each_is_on_a_page_that_not_all_fit_on():
     assert first[TAKE_TURNS : 2 * TAKE_TURNS] == [("naive_vs_texting", episode) for episode in range(TAKE_TURNS)]
     assert sorted(first[2 * TAKE_TURNS :]) == [
         (arm, episode) for arm in ("naive_vs_speedy", "naive_vs_texting") for episode in (60, 61)
+    ]
+
+
+def test_order__games_with_another_persons_trait_are_last_but_for_examples():
+    person = PersonaNonEgo(persona="speedy", borrowed=Borrowed(trait="attention", of="careful"))
+    arm = Arm(ego=NAIVE, non_ego=person)
+    table = episodes(
+        *((arm.name, episode, "collision") for episode in range(3)),
+        *(("naive_vs_speedy", episode, "goal") for episode in range(3)),
+    )
+    arms, examples = ARMS | {arm.name: arm}, [("naive_vs_speedy", 1, 2), (arm.name, 1, 2)]
+    order = [(row.arm, row.episode) for row in watching_order(table, arms, examples).itertuples()]
+    assert order == [
+        *(("naive_vs_speedy", 2), (arm.name, 2)),
+        *(("naive_vs_speedy", 0), ("naive_vs_speedy", 1)),
+        *((arm.name, 0), (arm.name, 1)),
     ]
 
 

@@ -18,6 +18,7 @@ from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.strategies import (
     NAIVE_ALONE,
     Arm,
+    Borrowed,
     NaiveEgo,
     PersonaNonEgo,
     RetrainedEgo,
@@ -77,6 +78,13 @@ def test_bound__that_was_not_measured_is_not_kept(bound: str) -> None:
     run = replace(run, arms=run.arms | {RETRAINED_VS.name: RETRAINED_VS})
     (check,) = judge({bound: 1.0}, "last", ["speedy"], [1], run)
     assert (check.measured, check.passed) == (False, False)
+
+
+def test_failure_rate__is_not_that_against_a_person_with_another_persons_trait() -> None:
+    person = PersonaNonEgo(persona="speedy", borrowed=Borrowed(trait="reaction", of="careful"))
+    run = evidence({NAIVE_VS: hundred(0), Arm(ego=NaiveEgo(), non_ego=person): hundred(90)})
+    (check,) = judge({"failure_rate": 0.1}, "naive", ["speedy"], [1], run)
+    assert (check.arm, check.passed) == (NAIVE_VS.name, True)
 
 
 def test_judged_ego__is_that_of_the_last_round_that_was_played() -> None:

@@ -166,35 +166,43 @@ def test_compare__rounding_errors_are_no_spread():
 
 
 def test_compare__verdict_says_when_only_the_uncorrected_p_value_is_significant():
-    # the failure row's p-value lies between 0.025 and 0.05, and there are two tests: Holm doubles it
-    random = np.random.default_rng(5).normal(0, 1, 40)
-    arms = (
-        games("naive_alone", [0] * 40, speed=20 + random),
-        games("naive_vs_speedy", [1, 1, 1] + [0] * 37, speed=20 + random[::-1]),
-    )
-    failure, mean_speed = both_metrics(RQ1, *arms, significance=0.05)
-    assert 0.025 < failure["p_value"] < 0.05 < mean_speed["p_value"]
+    arms = games("naive_alone", [0] * 40), games("naive_vs_speedy", [1, 1, 1] + [0] * 37)
+    failure = compare([RQ1], pd.concat(arms), 0.05, planned=2).to_dict("records")[0]
+    assert 0.025 < failure["p_value"] < 0.05
     assert same(failure["p_holm"], 2 * failure["p_value"])
-    assert (failure["rejects_h0"], failure["verdict"]) == (
-        True,
-        "significant before Holm's correction only",
-    )
+    assert (failure["rejects_h0"], failure["verdict"]) == (True, "significant before Holm's correction only")
+    alone = compare([RQ1], pd.concat(arms), 0.05, planned=1).to_dict("records")[0]
+    assert (alone["p_holm"], alone["verdict"]) == (alone["p_value"], "significant")
 
 
-def test_compare__holm_is_over_all_rows_that_have_a_p_value():
-    questions = [replace(RQ1, seed=k) for k in (1, 2, 3)]
-    random = np.random.default_rng(9)
+def test_compare__tests_of_speed_are_secondary_and_not_corrected():
+    random = np.random.default_rng(5)
+    arms = games("naive_alone", [0] * 40, 20 + random.random(40)), games("naive_vs_speedy", [0] * 40, [15.0] * 40)
+    failure, speed = both_metrics(RQ1, *arms)
+    assert (failure["planned_tests"], failure["verdict"]) == (1, "no difference")
+    assert speed["p_value"] < 1e-6
+    assert speed["rejects_h0"]
+    assert pd.isna(speed["planned_tests"])
+    assert math.isnan(speed["p_holm"])
+    assert speed["verdict"] == "significant without correction (secondary test)"
+
+
+def test_compare__holm_is_over_all_planned_questions_whatever_comes_of_them():
+    """Of four planned questions one shows no difference, and one is not played at all."""
+    failing = {1: 12, 2: 8, 3: 0}
     episodes = pd.concat(
-        games(arm, [0] * 20, random.normal(speed, 2, 20), seed=k)
-        for k in (1, 2, 3)
-        for arm, speed in (("naive_alone", 21), ("naive_vs_speedy", 20))
+        games(arm, [1] * count + [0] * (20 - count), seed=seed)
+        for seed, failures in failing.items()
+        for arm, count in (("naive_alone", 0), ("naive_vs_speedy", failures))
     )
-    table = compare(questions, episodes, 0.05)
-    tests = table[table["metric"] == "mean_speed"]
-    first, second, third = tests["p_value"].sort_values()
-    by_hand = [3 * first, max(3 * first, 2 * second), max(3 * first, 2 * second, third)]
-    assert sorted(tests["p_holm"]) == pytest.approx([min(p, 1) for p in by_hand])
-    assert table.loc[table["metric"] == "failure", "p_holm"].isna().all()
+    questions = [replace(RQ1, seed=seed) for seed in failing]
+    table = compare(questions, episodes, 0.05, planned=4)
+    first, second, none = table[table["metric"] == "failure"].to_dict("records")
+    assert same(first["p_holm"], 4 * first["p_value"])
+    assert same(second["p_holm"], 3 * second["p_value"])
+    assert (none["verdict"], none["planned_tests"]) == ("no difference", 4)
+    assert math.isnan(none["p_holm"])
+    assert set(table["about"]) == {"this trained pair"}
 
 
 def test_compare__harm_to_others_is_what_grows_and_a_family_of_its_own():
@@ -208,8 +216,8 @@ def test_compare__harm_to_others_is_what_grows_and_a_family_of_its_own():
     # mean 0.2, variance (20 * 0.8**2 + 80 * 0.2**2) / 99 = 16 / 99, t = 0.2 / sqrt(16 / 9900) = 4.975
     assert person["t"] == pytest.approx(0.2 / math.sqrt(16 / 9900))
     assert person["verdict"] == "significant"
-    # one test of each family: Holm's correction changes neither
-    assert (person["p_holm"], failure["p_holm"]) == (person["p_value"], failure["p_value"])
+    # three tests of harm, of which one could be made; and one planned test
+    assert (person["p_holm"], failure["p_holm"]) == (pytest.approx(3 * person["p_value"]), failure["p_value"])
     # games without a follower are left out; where it is, it brakes harder by 1 m/s2 each time
     assert (braking["pairs"], braking["pairs_left_out"], braking["mean_difference"]) == (50, 50, 1.0)
     assert braking["verdict"] == "no t statistic: all differences equal"
@@ -244,6 +252,7 @@ def test_compare__rejects_random_arms_without_a_difference_at_the_rate_of_signif
         for arm in (RQ1.baseline, RQ1.treatment):
             arms.append(games(arm, random.random(count) < 0.2, start + random.normal(0, 1, count), seed=k))
     table = compare([replace(RQ1, seed=k) for k in range(campaigns)], pd.concat(arms), 0.05)
+    assert table["planned_tests"].dropna().eq(campaigns).all()
     three_deviations = 3 * math.sqrt(0.05 * 0.95 / campaigns)
     assert table.groupby("metric")["rejects_h0"].mean().max() < 0.05 + three_deviations
     assert (table["p_holm"] < 0.05).sum() == 0
@@ -259,12 +268,29 @@ def test_compare__rejects_random_arms_without_a_difference_at_the_rate_of_signif
     [
         # ascending: 0.005 * 4 = 0.02; 0.01 * 3 = 0.03; 0.03 * 2 = 0.06; 0.04 * 1 = 0.04 -> 0.06, it may not fall
         ([0.01, 0.04, 0.03, 0.005], [0.03, 0.06, 0.06, 0.02]),
-        ([0.9, math.nan, 0.4], [0.9, math.nan, 0.8]),  # two tests: 0.4 * 2 = 0.8; 0.9 * 1 = 0.9
+        # the test that could not be made has p = 1: ascending 0.02 * 3 = 0.06; 0.04 * 2 = 0.08
+        ([0.04, math.nan, 0.02], [0.08, math.nan, 0.06]),
         ([0.5, 0.5, 0.5], [1, 1, 1]),
+        ([math.nan, math.nan], [math.nan, math.nan]),
+        ([], []),
     ],
 )
 def test_holm__agrees_with_the_arithmetic_on_paper(p_values, adjusted):
     assert holm(np.array(p_values)).tolist() == pytest.approx(adjusted, nan_ok=True)
+
+
+def test_holm__counts_planned_tests_that_are_absent():
+    # 5 planned, 2 made, 1 without a p-value: 0.01 * 5 = 0.05; 0.02 * 4 = 0.08
+    assert holm(np.array([0.02, math.nan, 0.01]), 5).tolist() == pytest.approx([0.08, math.nan, 0.05], nan_ok=True)
+    assert holm(np.array([0.01]), 1).tolist() == [0.01]
+
+
+@given(p_value_lists, st.integers(0, 10))
+def test_holm__a_test_that_could_not_be_made_is_one_with_p_1(p_values, absent):
+    p = np.array([*p_values, *[math.nan] * absent], dtype=float)
+    made = ~np.isnan(p)
+    np.testing.assert_array_equal(holm(p)[made], holm(np.where(made, p, 1.0))[made])
+    np.testing.assert_array_equal(holm(p[made], len(p)), holm(p)[made])
 
 
 @given(p_value_lists)
