@@ -33,7 +33,6 @@ _PERSONAS = {  # none that lets go of the wheel, as `texting` does: it leaves ev
     CandidateKind.FOLLOWING: ("speedy", "tailgater"),
     CandidateKind.ZEBRA: ("jaywalker", "phone_walker"),
 }
-_EGO_WAITS = (CandidateKind.ZEBRA, CandidateKind.FOLLOWING)  # for the non-ego, which is before it or has priority
 _MEANINGS = {
     CandidateKind.TURN_ACROSS: "the non-ego comes towards the ego and turns across its way",
     CandidateKind.CROSSING: "the non-ego crosses the ego's way",
@@ -171,5 +170,4 @@ def _campaign_text(name: str, plan: GamePlan) -> str:
         name=name,
         personas=("red_light_runner",) if signals else _PERSONAS.get(kind, ("impatient",)),
         meaning=_MEANINGS[kind],
-        ego_waits=kind in _EGO_WAITS,
     )

@@ -83,9 +83,9 @@ class Training(Document):
 class NaiveTraining(Document):
     """Training of the ego in round 0."""
 
-    alone_share: float = Field(1.0, ge=0.0, le=1.0)
+    alone_share: float = Field(0.3, ge=0.0, le=1.0)
     """Share of games without the non-ego. In the others SUMO's driver has its place, on foot an ordinary walker: the
-    ego learns to cope with people who keep the rules, before it is tested with those who do not."""
+    ego learns to cope with people who keep the rules, before it is tested with those who do not. The paper's is 1."""
 
 
 class NonEgoTraining(Document):

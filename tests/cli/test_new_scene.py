@@ -106,8 +106,6 @@ def test_write__scenes_of_other_kinds_are_in_order(town: OpenMap, tmp_path: Path
     assert write_scenes(town, {name: [plan] for name, plan in chosen.items()}, tmp_path) == (chosen, [])
     scenes = {name: open_scene(tmp_path / "networks" / name) for name in kinds}
     assert [scene.document.players[1].on_foot for scene in scenes.values()] == [False, False]
-    campaigns = [open_campaign(tmp_path / "campaigns" / f"{name}.toml").document for name in kinds]
-    assert [each.naive_training.alone_share for each in campaigns] == [1.0, 1.0]  # the ego need not wait
 
 
 def test_write__the_time_limit_names_the_red_that_it_waits_for(town: OpenMap, tmp_path: Path) -> None:
@@ -128,8 +126,6 @@ def test_write__a_zebra_crossing_of_a_map_the_ego_must_yield(town: OpenMap, tmp_
     assert table.yields[table.player == 0].any()
     assert not table.yields[table.player == 1].any()
     assert len(scene.stripes) > 3
-    campaign = open_campaign(tmp_path / "campaigns" / "zebra.toml").document
-    assert campaign.naive_training.alone_share == 0.3
 
 
 def test_new__of_no_number_makes_the_first_that_is_listed(tmp_path: Path, new: Run) -> None:

@@ -71,7 +71,7 @@ def test_plan__trainings_of_a_learned_ego(warm: bool) -> None:
     shares = {"non_ego_training": {"alone_share": 0.125}, "retraining": {"alone_share": 0.5, "warm_start": warm}}
     stages = stages_of("anna", **shares)
     naive, anna, retrained = (stages[name] for name in ("naive", "anna", "retrained_anna"))
-    assert (naive.learner, naive.opponent, naive.initial, naive.alone_share) == (EGO, (), None, 1.0)
+    assert (naive.learner, naive.opponent, naive.initial, naive.alone_share) == (EGO, (SumoDriven(),), None, 0.3)
     assert (anna.learner, anna.initial, anna.alone_share) == (NON_EGO, None, 0.125)
     assert anna.opponent == (Trained(stage="naive-seed1"),)
     assert (retrained.learner, retrained.alone_share) == (EGO, 0.5)
@@ -83,14 +83,14 @@ def test_plan__trainings_of_a_learned_ego(warm: bool) -> None:
     )
 
 
-def test_plan__the_naive_ego_may_train_beside_sumos_driver(tmp_path: Path) -> None:
-    stages, alone = planned(tmp_path)
-    beside, keys = planned(tmp_path, naive_training={"alone_share": 0.25})
-    naive = beside["naive-seed1"]
+def test_plan__the_naive_ego_may_train_alone(tmp_path: Path) -> None:
+    stages, beside = planned(tmp_path)
+    alone, keys = planned(tmp_path, naive_training={"alone_share": 1.0})
+    naive = alone["naive-seed1"]
     assert isinstance(naive, TrainingStage)
-    assert (naive.opponent, naive.alone_share) == ((SumoDriven(),), 0.25)
-    assert (naive.needs, list(beside)) == ((), list(stages))
-    assert keys["naive-seed1"] != alone["naive-seed1"]
+    assert (naive.opponent, naive.alone_share) == ((), 1.0)
+    assert (naive.needs, list(alone)) == ((), list(stages))
+    assert keys["naive-seed1"] != beside["naive-seed1"]
 
 
 @pytest.mark.parametrize("driver", ["sumo", "policy"])
