@@ -21,7 +21,7 @@ OVER_TRAININGS = (
     Column("ci_high", NUMBER, f"The high end of its {_CROSSED}.", unit=POINTS, label="its 95 % high"),
     Column("least", NUMBER, "The mean difference of the training with the least.", unit=POINTS),
     Column("most", NUMBER, "That of the training with the most.", unit=POINTS),
-    Column("standard_error", NUMBER, "Of mean_difference, by the bootstrap.", unit=POINTS, source="Owen 2007"),
+    Column("standard_error", NUMBER, "Of mean_difference, by a two-level bootstrap.", unit=POINTS, source="Owen 2007"),
     Column("degrees", NUMBER, "Degrees of freedom of t.", source="Satterthwaite 1946"),
     Column("t", NUMBER, "mean_difference / standard_error; empty where all differences are equal."),
 )

@@ -100,7 +100,19 @@ def virtual_screen(program: Path, size_px: tuple[int, int]) -> Iterator[str]:
     read, write = os.pipe()
     screen = f"{size_px[0]}x{size_px[1]}x24"
     # Xvfb chooses a free number and writes it when it is ready
-    command = [str(program), "-displayfd", str(write), "-screen", "0", screen, "-nolisten", "tcp", "+extension", "GLX"]
+    command = [
+        str(program),
+        "-displayfd",
+        str(write),
+        "-screen",
+        "0",
+        screen,
+        "-noreset",
+        "-nolisten",
+        "tcp",
+        "+extension",
+        "GLX",
+    ]
     with tempfile.TemporaryFile() as log:
         try:
             server = subprocess.Popen(command, pass_fds=(write,), stdout=log, stderr=log)

@@ -103,12 +103,14 @@ def test_request_to_end__is_like_ctrl_c_and_a_second_command_is_refused(tmp_path
     for number, code, second in ((signal.SIGTERM, 143, first), (signal.SIGHUP, 129, report)):
         process = begin(*first)
         wait_for(lambda leader=process.pid: workers_of(leader), "the first worker")  # type: ignore[misc]
+        process.send_signal(signal.SIGSTOP)  # it must not end before it is asked to
         refused = harness(*second)
         assert (refused.returncode, refused.stdout) == (2, "")
         assert refused.stderr.splitlines() == [
             f"{run}: is in use by process {process.pid} (wait until it has ended, or choose another folder with --out)"
         ]
         process.send_signal(number)
+        process.send_signal(signal.SIGCONT)
         assert_interrupted(process, code)
     carried_out(campaign, run)
     assert tables(run) == tables(untrained_run())

@@ -92,7 +92,7 @@ def test_five_seeds__are_the_papers_campaign_five_times(repository: Path) -> Non
 def test_merge_seeds__are_the_merge_five_times() -> None:
     five, one = (open_campaign(CAMPAIGNS / f"{name}.toml").document for name in ("merge-seeds", "merge"))
     assert five.model_copy(update={"name": one.name, "seeds": one.seeds, "best_response": None}) == one
-    assert five.seeds == [11, 12, 13, 14, 15]
+    assert five.seeds == [21, 22, 23, 24, 25]
 
 
 def test_shipped_policies__each_has_its_model_card_and_was_trained_on_the_scene() -> None:

@@ -1,0 +1,229 @@
+"""Compute every headline of published run folders again, from their games, with pandas and SciPy alone.
+
+    python docs/publish/recompute.py                 # all folders in reports/
+    python docs/publish/recompute.py reports/merge   # these
+
+It reads episodes.csv, or episodes.csv.gz, and compares with summary.csv, comparisons.csv, over_trainings.csv and
+attribution.csv of the same folder. It imports nothing of the harness: its formulas are written a second time, from the
+descriptions in docs/columns.md and docs/verdicts.md. It prints how many cells agree, each that does not, and ends with
+exit code 1 if one does not.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pandas as pd
+from scipy import stats
+
+REPORTS = Path(__file__).parents[2] / "reports"
+SIGNIFICANCE = 0.01
+CLOSE = 1e-9  # relative, and absolute for what should be 0
+COLUMNS = {
+    "failure": "ego_failed",
+    "mean_speed": "ego_mean_speed_mps",
+    "person_failure": "person_failed",
+    "bystander_failure": "bystander_failed",
+    "follower_braking": "follower_max_deceleration_mps2",
+}
+HARM = ("person_failure", "bystander_failure", "follower_braking")
+SIGNS = {("RQ1", "failure"): 1, ("RQ1", "mean_speed"): -1, ("RQ2", "failure"): -1, ("RQ2", "mean_speed"): 1}
+Cell = tuple[str, float, float]  # where, as published, as computed here
+
+
+class Games:
+    """The games of a run folder, by arm and training seed."""
+
+    def __init__(self, run: Path) -> None:
+        episodes = next(path for name in ("episodes.csv", "episodes.csv.gz") if (path := run / name).exists())
+        table = pd.read_csv(episodes, low_memory=False)
+        self.played = table[(table["ego_outcome"] != "error") & table["error"].isna()]
+        self.by_arm = {place: rows.set_index("episode") for place, rows in self.played.groupby(["arm", "seed"])}
+
+    def of(self, arm: str, seed: int) -> pd.DataFrame:
+        return self.by_arm.get((arm, seed), self.played.iloc[:0].set_index("episode"))
+
+    def differences(self, less: str, more: str, seed: int, column: str) -> pd.Series:
+        """`more` - `less` in the games of the same start."""
+        pair = self.of(more, seed)[column] - self.of(less, seed)[column]
+        return pair.astype(float).dropna()
+
+
+def clopper_pearson(successes: float, games: int) -> tuple[float, float]:
+    low = stats.beta.ppf(0.025, successes, games - successes + 1) if successes else 0.0
+    high = stats.beta.ppf(0.975, successes + 1, games - successes) if successes < games else 1.0
+    return float(low), float(high)
+
+
+def t_interval(values: pd.Series) -> tuple[float, float]:
+    error = values.std() / math.sqrt(len(values))
+    reach = stats.t.ppf(0.975, len(values) - 1) * error
+    return values.mean() - reach, values.mean() + reach
+
+
+def mcnemar(differences: pd.Series, sides: int) -> float:
+    """The exact p-value that more pairs are above 0 than below it; with two sides, that the two differ."""
+    above, below = int((differences > 0).sum()), int((differences < 0).sum())
+    pairs = above + below
+    if sides == 1:
+        return float(stats.binom.sf(above - 1, pairs, 0.5)) if pairs else 1.0
+    return min(1.0, 2 * float(stats.binom.cdf(min(above, below), pairs, 0.5))) if pairs else 1.0
+
+
+def holm(p_values: list[float], tests: int) -> list[float]:
+    """Adjusted p-values in a family of so many tests; NaN stays."""
+    adjusted, least = [math.nan] * len(p_values), 0.0
+    made = sorted((p, place) for place, p in enumerate(p_values) if not math.isnan(p))
+    for rank, (p, place) in enumerate(made):
+        least = max(least, min(1.0, p * (tests - rank)))
+        adjusted[place] = least
+    return adjusted
+
+
+def summary(table: pd.DataFrame, games: Games) -> Iterator[Cell]:
+    for row in table.to_dict("records"):
+        arm, where = games.of(row["arm"], row["seed"]), f"summary, {row['arm']}, seed {row['seed']}"
+        shares = {"failure_rate": "ego_failed", "near_miss_rate": "near_miss", "harm_to_others_rate": "harm_to_others"}
+        for name, column in shares.items():
+            values = arm[column].dropna().astype(float)
+            if not len(values):
+                continue
+            low, high = clopper_pearson(values.sum(), len(values))
+            for end, value in (("", values.mean()), ("_low", low), ("_high", high)):
+                yield f"{where}, {name}{end}", row[name + end], value
+        if arm["ego_failed"].notna().any():
+            for name, outcome in (("collisions", "collision"), ("rails", "rail"), ("timeouts", "timeout")):
+                yield f"{where}, {name}", row[name], (arm["ego_outcome"] == outcome).sum()
+            yield f"{where}, mean_speed_mps", row["mean_speed_mps"], arm["ego_mean_speed_mps"].mean()
+            yield f"{where}, ego_payoff", row["ego_payoff"], arm["ego_payoff"].mean()
+
+
+def arms(question: str, persona: str) -> tuple[str, str]:
+    return (
+        ("naive_alone", f"naive_vs_{persona}")
+        if question == "RQ1"
+        else (f"naive_vs_{persona}", f"retrained_vs_{persona}")
+    )
+
+
+def comparisons(table: pd.DataFrame, games: Games) -> Iterator[Cell]:
+    for row in table.to_dict("records"):
+        question, metric = row["question"], row["metric"]
+        sign = SIGNS.get((question, metric), 1)
+        values = sign * games.differences(*arms(question, row["persona"]), row["seed"], COLUMNS[metric])
+        where = f"comparisons, {question} {row['persona']}, seed {row['seed']}, {metric}"
+        yield f"{where}, pairs", row["pairs"], len(values)
+        if len(values):
+            yield f"{where}, mean_difference", row["mean_difference"], values.mean()
+        if not math.isnan(row["p_value"]):
+            t = values.mean() / (values.std() / math.sqrt(len(values)))
+            low, high = t_interval(values)
+            found = {"ci_low": low, "ci_high": high, "t": t, "p_value": stats.t.sf(t, len(values) - 1)}
+            for name, value in found.items():
+                yield f"{where}, {name}", row[name], value
+        elif pd.isna(row["reason"]) and len(values) > 1:
+            yield f"{where}, spread without a test", 0.0, values.std()
+        if not math.isnan(row["mcnemar_p"]):
+            yield f"{where}, mcnemar_p", row["mcnemar_p"], mcnemar(values, sides=1)
+    for family in ((table["metric"] == "failure"), table["metric"].isin(HARM)):
+        rows = table[family]
+        tests = int(rows["planned_tests"].iloc[0]) if rows["planned_tests"].notna().any() else len(rows)
+        for row, value in zip(rows.to_dict("records"), holm(rows["p_value"].tolist(), tests), strict=True):
+            where = f"comparisons, {row['question']} {row['persona']}, seed {row['seed']}, {row['metric']}"
+            yield f"{where}, p_holm", row["p_holm"], value
+            if row["metric"] == "failure" and not math.isnan(value):
+                yield f"{where}, significant", float(row["verdict"] == "significant"), float(value < SIGNIFICANCE)
+
+
+def over_trainings(table: pd.DataFrame, games: Games, answered: pd.DataFrame) -> Iterator[Cell]:
+    """`answered` is comparisons.csv, which says of which training seeds the question is answered."""
+    for row in table.to_dict("records"):
+        question, persona = row["question"], row["persona"]
+        asked = answered[(answered["question"] == question) & (answered["persona"] == persona)]
+        seeds = asked[(asked["metric"] == "failure") & asked["reason"].isna()]["seed"]
+        sign, where = SIGNS[question, "failure"], f"over_trainings, {question} {persona}"
+        columns = [sign * games.differences(*arms(question, persona), seed, "ego_failed") for seed in seeds]
+        yield f"{where}, trainings", row["trainings"], len(columns)
+        if math.isnan(row["mean_difference"]):
+            continue
+        both = pd.concat(columns, axis=1).dropna()  # a row for each start, a column for each training
+        starts, trainings = both.shape
+        mean = both.to_numpy().mean()
+        yield f"{where}, mean_difference", row["mean_difference"], mean
+        if math.isnan(row["p_value"]):
+            continue
+        centred = both - mean
+        squares = (centred**2).to_numpy().sum()
+        squares += (1 - 1 / starts) * (centred.sum(axis=0) ** 2).sum()
+        squares += (1 - 1 / trainings) * (centred.sum(axis=1) ** 2).sum()
+        of_trainings = both.mean().var() / trainings
+        variance = squares / both.size**2 + of_trainings / trainings
+        rest = max(variance - of_trainings, 0.0)
+        degrees = variance**2 / (of_trainings**2 / (trainings - 1) + rest**2 / (starts - 1))
+        t, reach = mean / math.sqrt(variance), stats.t.ppf(0.975, degrees) * math.sqrt(variance)
+        found = {"t": t, "p_value": stats.t.sf(t, degrees), "standard_error": math.sqrt(variance), "degrees": degrees}
+        found |= {"ci_low": max(-1.0, mean - reach), "ci_high": min(1.0, mean + reach)}
+        for name, value in found.items():
+            yield f"{where}, {name}", row[name], value
+    tests = int(table["planned_tests"].iloc[0]) if len(table) else 0
+    for row, value in zip(table.to_dict("records"), holm(table["p_value"].tolist(), tests), strict=True):
+        yield f"over_trainings, {row['question']} {row['persona']}, p_holm", row["p_holm"], value
+
+
+def attribution(table: pd.DataFrame, games: Games) -> Iterator[Cell]:
+    p_values: list[float] = []
+    for row in table.to_dict("records"):
+        where = f"attribution, {row['persona']} {row['trait']}, seed {row['seed']}"
+        sides = (("without", row["without_arm"], row["arm"]), ("alone", row["baseline_arm"], row["alone_arm"]))
+        for side, less, more in sides:
+            p_values.append(row[f"{side}_p"])
+            if not isinstance(less, str) or not isinstance(more, str):
+                continue
+            values = games.differences(less, more, row["seed"], "ego_failed")
+            yield f"{where}, {side}_pairs", row[f"{side}_pairs"], len(values)
+            yield f"{where}, {side}_difference", row[f"{side}_difference"], values.mean()
+            if not math.isnan(row[f"{side}_p"]):
+                yield f"{where}, {side}_p", row[f"{side}_p"], mcnemar(values, sides=2)
+    published = [row[f"{side}_p_holm"] for row in table.to_dict("records") for side in ("without", "alone")]
+    for number, (as_published, value) in enumerate(zip(published, holm(p_values, len(p_values)), strict=True)):
+        yield f"attribution, p_holm {number}", as_published, value
+
+
+def cells_of(run: Path) -> Iterator[Cell]:
+    games, tables = Games(run), {path.stem: pd.read_csv(path) for path in sorted(run.glob("*.csv"))}
+    yield from summary(tables["summary"], games)
+    yield from comparisons(tables["comparisons"], games)
+    if "over_trainings" in tables:
+        yield from over_trainings(tables["over_trainings"], games, tables["comparisons"])
+    if "attribution" in tables:
+        yield from attribution(tables["attribution"], games)
+
+
+def agree(published: float, computed: float) -> bool:
+    if pd.isna(published) or pd.isna(computed):
+        return bool(pd.isna(published) and pd.isna(computed))
+    return math.isclose(published, computed, rel_tol=CLOSE, abs_tol=CLOSE)
+
+
+def main(runs: list[Path]) -> int:
+    mismatches = 0
+    for run in runs:
+        if "planned_tests" not in pd.read_csv(run / "comparisons.csv", nrows=0):
+            print(f"{run.name}: left out, its tables are those of an older version")
+            continue
+        cells = list(cells_of(run))
+        wrong = [cell for cell in cells if not agree(*cell[1:])]
+        mismatches += len(wrong)
+        print(f"{run.name}: {len(cells) - len(wrong)} of {len(cells)} cells agree")
+        for where, published, computed in wrong:
+            print(f"  {where}: published {published}, computed {computed}")
+    return int(mismatches > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(
+        main([Path(each) for each in sys.argv[1:]] or sorted(each.parent for each in REPORTS.glob("*/summary.csv")))
+    )

@@ -1,0 +1,40 @@
+"""The second computation of what is published: it agrees, and it finds a cell that is not what the games say."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from tests.support.repository import REPOSITORY
+from tests.support.scripts import script
+
+recompute = script("publish/recompute.py")
+REPORTS = REPOSITORY / "reports"
+MERGE = REPORTS / "merge"
+
+
+@pytest.mark.parametrize("run", sorted(each.parent.name for each in REPORTS.glob("*/summary.csv")))
+def test_published_tables__are_those_of_their_games(run: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert recompute.main([REPORTS / run]) == 0, capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("table", "column", "where"),
+    [
+        ("summary", "failure_rate_high", "summary, naive_alone, seed 21, failure_rate_high"),
+        ("comparisons", "p_holm", "comparisons, RQ1 speedy, seed 21, failure, p_holm"),
+        ("attribution", "without_difference", "attribution, speedy all, seed 21, without_difference"),
+    ],
+)
+def test_cell__that_the_games_do_not_give_is_found(
+    table: str, column: str, where: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = shutil.copytree(MERGE, tmp_path / "merge", ignore=shutil.ignore_patterns("traces", "replays", "policies"))
+    cells = pd.read_csv(run / f"{table}.csv")
+    cells.loc[0, column] += 0.001
+    cells.to_csv(run / f"{table}.csv", index=False)
+    assert recompute.main([run]) == 1
+    assert f"  {where}: published " in capsys.readouterr().out
