@@ -144,8 +144,8 @@ class Acceptance(Document):
     failure_rate_alone: Share | None = None
     """Largest failure rate without the non-ego: what the ego could do before, it must not forget."""
     preventable_failure_rate: Share | None = None
-    """Largest rate of failures against a persona that a reference driver prevents when it drives the game from its
-    start. Measured with assessment.reference_drivers."""
+    """Largest rate of failures against a persona that the careful and competent driver of UN R157 prevents when it
+    drives the game from its start. Measured with assessment.reference_drivers."""
     near_miss_rate: Share | None = None
     """Largest share of games with a near miss against a persona: no contact, but too close by time to collision,
     post-encroachment time or time headway, as the columns `near_miss_...` of episodes.csv say."""

@@ -329,7 +329,7 @@ _TABLES = {
     ),
     "preventability": (
         *(ARM, PERSONA, SEED),
-        Column("driver", TEXT, "The reference driver; `any`: any of them but the upper bound."),
+        Column("driver", TEXT, "The reference driver."),
         Column("episodes", COUNT, "Games that were played.", label="games"),
         Column("failures", COUNT, "Failures of the ego."),
         *_prevented("from_conflict"),

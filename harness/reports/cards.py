@@ -21,7 +21,7 @@ from harness.reports.arm_figures import (
 from harness.reports.differences import statistics
 from harness.reports.game_links import GameLinks
 from harness.reports.human_ranges import crashes_alone
-from harness.reports.key_figures import card_verdict, key_figures, portrait
+from harness.reports.key_figures import card_verdict, egos_of, key_figures, portrait
 from harness.reports.numbers import MISSING, number, percent, sure
 from harness.reports.run_tables import QUESTIONS, Row, RunTables, failures, failures_of, played
 from harness.reports.scope_wording import over_trainings_statistics
@@ -151,10 +151,10 @@ def _facts(persona: str, is_changed: bool, tables: RunTables) -> list[tuple[str,
     }
     if causes:
         facts.append((f"How the {tables.naive} fails against {persona}", _by_seed(causes)))
-    judged = [each for each in tables.prevented_in(arm) if each.row["failures"]]
-    prevented = {each.row["seed"]: " ".join(each.sentences) for each in judged}
-    if prevented:
-        facts.append(("Could it have been prevented?", _by_seed(prevented)))
+    for _, made, judged in egos_of(persona, tables):
+        prevented = {seed: " ".join(sentences) for seed, sentences in tables.preventability_of(judged).items()}
+        if prevented:
+            facts.append((f"Could the failures of the {made} have been prevented?", _by_seed(prevented)))
     facts.append(("An ordinary SUMO driver in the persona's place", _ordinary_driver(persona, tables)))
     by_driver = [row for row in tables.populations.to_dict("records") if row["population"] == persona]
     if by_driver:

@@ -62,14 +62,17 @@ def _causes(persona: str, tables: RunTables) -> Iterator[KeyFigure]:
 
 def _preventable(persona: str, tables: RunTables) -> Iterator[KeyFigure]:
     lines = []
-    naive, _ = tables.arms_of("RQ2", persona)
-    for row, _ in tables.prevented_in(naive):
-        if row["failures"]:
-            count = f"{row['from_start_prevented']} of {row['from_start_judged']} failures of the {tables.naive}"
-            share = sure(row["from_start_rate_low"], row["from_start_rate_high"])
-            rate = f"{percent(row['from_start_rate'])} of its games, {share}"
-            lines.append(f"{_seed(row['seed'], tables)}{count} by a reference driver in its seat ({rate})")
-    yield KeyFigure(title="Preventable", lines=lines)
+    for _, made, arm in egos_of(persona, tables):
+        for row in tables.prevented_in(arm):
+            verdicts = [
+                f"{row[f'{verdict}_prevented']} of {row[f'{verdict}_judged']} {what}"
+                for verdict, what in (("from_conflict", "from the conflict on"), ("from_start", "from the start"))
+                if row[f"{verdict}_judged"]
+            ]
+            if verdicts:
+                lines.append(f"{_seed(row['seed'], tables)}{made}: {', '.join(verdicts)}")
+    title = "Preventable by the careful and competent driver of UN R157"
+    yield KeyFigure(title=title, lines=lines)
 
 
 def _severity(persona: str, tables: RunTables) -> Iterator[KeyFigure]:

@@ -141,13 +141,13 @@ def _prevented(tables: RunTables) -> list[str]:
     all_avoided, all_failures = 0, 0
     for persona, arm in arms.items():
         judged = tables.prevented_in(arm)
-        avoided = sum(each.row["from_start_prevented"] for each in judged)
-        failed = sum(each.row["from_start_judged"] for each in judged)
+        avoided = sum(row["from_start_prevented"] for row in judged)
+        failed = sum(row["from_start_judged"] for row in judged)
         if failed and lines:
             lines.append(f"Against {persona}: {avoided} of {failed}.")
         elif failed:
             lines.append(
-                f"Against {persona} a reference driver (a model of a careful human driver) in the seat of the "
+                f"Against {persona} the careful and competent driver of UN R157 in the seat of the "
                 f"{tables.naive} avoids {avoided} of its {failed} failures."
             )
         all_avoided, all_failures = all_avoided + avoided, all_failures + failed

@@ -19,7 +19,7 @@ import pandas as pd
 from harness.evaluation.comparisons.comparison import games_by_arm, mean_interval, pairs_of
 from harness.evaluation.comparisons.harm_clauses import Beside, harm_clauses
 from harness.evaluation.comparisons.near_misses import by_criterion
-from harness.evaluation.comparisons.preventability import ANY
+from harness.evaluation.comparisons.preventability import by_regulation
 from harness.evaluation.strategies import (
     Arm,
     EgoStrategy,
@@ -218,8 +218,8 @@ def _preventable(arm: str, seed: int, evidence: Evidence) -> Measured:
     judged = evidence.preventability
     if judged is None:
         return Measured(arm, np.nan, np.nan, 0)
-    for row in judged[(judged["arm"] == arm) & (judged["seed"] == seed)].to_dict("records"):
-        if row["driver"] == ANY:
+    for row in by_regulation(judged, arm):
+        if row["seed"] == seed:
             return Measured(arm, row["from_start_rate"], row["from_start_rate_high"], failures.games)
     return failures if failures.value == 0.0 else Measured(arm, np.nan, np.nan, 0)
 

@@ -1,8 +1,9 @@
-"""Which failures of the ego a reference driver would have prevented: the tables, their counts, and the sentence.
+"""Which failures of the ego a reference driver would have prevented: the tables, their counts, and the sentences.
 
 Two verdicts are kept apart (docs/preventability.md). From the conflict on, the reference driver takes over the recorded
 game when its own rule says danger, and the others repeat their recorded course. From the start, it plays the same
-seeded game from its first step, and the others react.
+seeded game from its first step, and the others react. Each driver is counted by itself: what at least one of several
+drivers prevents is no measure of any of them. Sentences name the driver of the regulation first.
 
 A cell is empty where the verdict does not exist: a contact with a rail and a timeout have no conflict to take over at,
 and a game may fail to be played.
@@ -11,30 +12,23 @@ and a game may fail to be played.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import pandas as pd
 
 from harness.evaluation.comparisons.comparison import rate_cells
 from harness.evaluation.tables import table_of
 
-ANY = "any"
-"""The row of `preventability.csv` on the games that at least one person among the reference drivers prevents."""
+REGULATION = "careful_and_competent"
+"""The reference driver of UN R157, by which failures are called preventable."""
 UPPER_BOUND = "upper_bound"
 _VERDICTS = ("from_conflict", "from_start")
-
-
-class Preventability(NamedTuple):
-    """What the failures of one arm and training seed come to."""
-
-    row: Mapping[Any, Any]
-    """The row of `ANY` in preventability.csv."""
-    sentences: list[str]
-    """The verdicts in words, one sentence each; empty without failures."""
+_WORDS = {REGULATION: "careful and competent driver", "fuzzy": "fuzzy safety model", "rss": "RSS"}
+"""Reference drivers in prose."""
 
 
 def count_prevented(games: pd.DataFrame, episodes: pd.DataFrame) -> pd.DataFrame:
-    """The rows of `preventability.csv`: for each arm and training seed, each reference driver and `ANY`.
+    """The rows of `preventability.csv`: for each arm and training seed, each reference driver.
 
     `games` is the table `reference_drivers`, `episodes` the table of this name. Shares are of the failures with a
     verdict, rates of all games that were played; both have the 95 % interval of all rates of a run.
@@ -47,9 +41,6 @@ def count_prevented(games: pd.DataFrame, episodes: pd.DataFrame) -> pd.DataFrame
         counted["failures"] = int(played["ego_failed"].sum())
         for name, driver in judged.groupby("driver", sort=False):
             rows.append({**counted, "driver": name, **_verdicts(driver, len(played))})
-        persons = judged[judged["driver"] != UPPER_BOUND]
-        columns = [f"prevented_{verdict}" for verdict in _VERDICTS]
-        rows.append({**counted, "driver": ANY, **_verdicts(persons.groupby("episode")[columns].max(), len(played))})
     return table_of("preventability", rows)
 
 
@@ -65,45 +56,47 @@ def _verdicts(games: pd.DataFrame, episodes: int) -> dict[str, float]:
     return cells
 
 
-def preventability_of(counts: pd.DataFrame, games: pd.DataFrame, arm: str) -> list[Preventability]:
-    """The verdicts on an arm, one for each training seed; empty where none was judged. `counts` and `games` are the
-    tables `preventability.csv` and `reference_drivers.csv`."""
-    found = []
+def by_regulation(counts: pd.DataFrame, arm: str) -> list[Mapping[Any, Any]]:
+    """The rows of preventability.csv on the driver of the regulation in an arm, one for each training seed."""
+    return counts[(counts["arm"] == arm) & (counts["driver"] == REGULATION)].to_dict("records")
+
+
+def sentences_of(counts: pd.DataFrame, games: pd.DataFrame, arm: str) -> dict[int, list[str]]:
+    """By training seed, the verdicts on an arm in words; without those that have no failures. `counts` and `games` are
+    the tables `preventability.csv` and `reference_drivers.csv`."""
+    found = {}
     for seed, rows in counts[counts["arm"] == arm].groupby("seed", sort=False):
         drivers = rows.set_index("driver")
         of_arm = games[(games["arm"] == arm) & (games["seed"] == seed)]
         last_chance_s = (of_arm["failed_s"] - of_arm["preventable_until_s"]).median()
-        row = drivers.loc[ANY].to_dict()
-        found.append(Preventability(row, list(_sentences(drivers, last_chance_s)) if row["failures"] else []))
+        if drivers.loc[REGULATION, "failures"]:
+            found[int(seed)] = list(_sentences(drivers, last_chance_s))
     return found
 
 
 def _sentences(drivers: pd.DataFrame, last_chance_s: float) -> Iterator[str]:
-    both, persons = drivers.loc[ANY], drivers.drop(index=[ANY, UPPER_BOUND], errors="ignore")
-    if both["from_start_judged"]:
-        yield (
-            f"A reference driver in its place from the start prevents {_of(both, 'from_start')} failures "
-            f"({_by_driver(persons['from_start_prevented'])})."
-        )
-        rate, low, high = (100.0 * both[f"from_start_rate{end}"] for end in ("", "_low", "_high"))
-        yield f"Preventable failure rate: {rate:.1f} % of {both['episodes']} games (95 %: {low:.1f}–{high:.1f} %)."
-    if both["from_conflict_judged"]:
+    first, others = drivers.loc[REGULATION], drivers.drop(index=[REGULATION, UPPER_BOUND], errors="ignore")
+    name = f"the {_WORDS[REGULATION]} of UN R157"
+    if first["from_conflict_judged"]:
         bound = drivers["from_conflict_prevented"].get(UPPER_BOUND, 0)
         yield (
-            f"Taking over when the danger shows, it prevents {_of(both, 'from_conflict')} collisions "
-            f"({_by_driver(persons['from_conflict_prevented'])}; full braking in the first moment of danger {bound})."
+            f"Taking over when the danger shows, {name} prevents {_of(first, 'from_conflict')} collisions "
+            f"({_by_driver(others['from_conflict_prevented'])}; full braking in the first moment of danger {bound})."
+        )
+    if first["from_start_judged"]:
+        rate, low, high = (100.0 * first[f"from_start_rate{end}"] for end in ("", "_low", "_high"))
+        yield (
+            f"In its place from the start, {name} prevents {_of(first, 'from_start')} failures "
+            f"({_by_driver(others['from_start_prevented'])}): {rate:.1f} % of {first['episodes']} games "
+            f"(95 %: {low:.1f}–{high:.1f} %)."
         )
     if pd.notna(last_chance_s):
         yield f"Full braking prevents the collision until {last_chance_s:.1f} s before it (median)."
 
 
-def _of(both: pd.Series, verdict: str) -> str:
-    return f"{both[f'{verdict}_prevented'] or 'none'} of {both[f'{verdict}_judged']}"
+def _of(row: pd.Series, verdict: str) -> str:
+    return f"{row[f'{verdict}_prevented'] or 'none'} of {row[f'{verdict}_judged']}"
 
 
 def _by_driver(prevented: pd.Series) -> str:
     return ", ".join(f"{_WORDS.get(str(name), name)} {count}" for name, count in prevented.items())
-
-
-_WORDS = {"careful_and_competent": "careful and competent", "fuzzy": "fuzzy safety model", "rss": "RSS"}
-"""Reference drivers in prose."""

@@ -109,10 +109,11 @@ FORGOTTEN = evidence({NAIVE_ALONE: hundred(0), RETRAINED_VS: hundred(0), ALONE: 
 SLOW = evidence({NAIVE_VS: hundred(0), RETRAINED_VS: hundred(0)}, {NAIVE_VS: 13.5, RETRAINED_VS: 12.0})
 PAIR = {"role": "ego", "ego": "retrained_speedy", "non_ego": "speedy", "persona": "speedy", "seed": 1}
 GAPS = replace(RUN, gaps=pd.DataFrame([PAIR | {"payoff": -20.0, "gap": 2.0, "ci_high": 3.0, "pairs": 50}]))
-ANY = {"arm": RETRAINED_VS.name, "seed": 1, "driver": "any", "from_start_rate": 0.02, "from_start_rate_high": 0.07}
+REGULATION = {"driver": "careful_and_competent", "from_start_rate": 0.02, "from_start_rate_high": 0.07}
+OF_ARM = {"arm": RETRAINED_VS.name, "seed": 1}
 JUDGED = replace(
     evidence({RETRAINED_VS: hundred(7)}),
-    preventability=pd.DataFrame([ANY, ANY | {"driver": "rss", "from_start_rate": 0.01}]),
+    preventability=pd.DataFrame([OF_ARM | {"driver": "rss", "from_start_rate": 0.01}, OF_ARM | REGULATION]),
 )
 UNFAILING = replace(RUN, preventability=pd.DataFrame(columns=["arm", "seed", "driver"]))
 

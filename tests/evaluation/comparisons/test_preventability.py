@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from harness.evaluation.columns import TABLES
-from harness.evaluation.comparisons.preventability import ANY, count_prevented, preventability_of
+from harness.evaluation.comparisons.preventability import REGULATION, by_regulation, count_prevented, sentences_of
 from harness.evaluation.tables import table_of, typed
 
 ARM = {"arm": "naive_vs_speedy", "persona": "speedy", "seed": 1}
@@ -31,12 +31,15 @@ def judged(episode: int, driver: str, conflict: int | None, start: int | None, *
 GAMES = typed(
     pd.DataFrame(
         [
+            judged(0, REGULATION, 1, 1),
             judged(0, "fuzzy", 0, 1, failed_s=4.0, preventable_until_s=3.5),
             judged(0, "rss", 1, 0),
             judged(0, "upper_bound", 1, 1),
+            judged(1, REGULATION, 0, 0),
             judged(1, "fuzzy", 0, 0, failed_s=5.0, preventable_until_s=4.0),
             judged(1, "rss", 0, 0),
             judged(1, "upper_bound", 1, 0),
+            judged(2, REGULATION, None, 1),
             judged(2, "fuzzy", None, 1),
             judged(2, "rss", None, 1),
             judged(2, "upper_bound", None, None, error="it broke"),
@@ -56,15 +59,15 @@ def counts() -> dict[str, dict[str, Any]]:
 def test_count__each_driver_in_each_verdict(counts: dict[str, dict[str, Any]]) -> None:
     names = ("from_conflict_judged", "from_conflict_prevented", "from_start_judged", "from_start_prevented")
     assert {driver: [row[name] for name in names] for driver, row in counts.items()} == {
+        REGULATION: [2, 1, 3, 2],
         "fuzzy": [2, 0, 3, 2],
         "rss": [2, 1, 3, 1],
         "upper_bound": [2, 2, 2, 1],
-        ANY: [2, 1, 3, 2],
     }
 
 
 def test_count__shares_are_of_failures_and_rates_of_games(counts: dict[str, dict[str, Any]]) -> None:
-    both = counts[ANY]
+    both = counts["fuzzy"]
     assert (both["episodes"], both["failures"]) == (10, 3)
     assert both["from_start_share"] == pytest.approx(2 / 3)
     assert both["from_start_rate"] == pytest.approx(0.2)
@@ -72,15 +75,19 @@ def test_count__shares_are_of_failures_and_rates_of_games(counts: dict[str, dict
     assert (both["from_start_rate_low"], both["from_start_rate_high"]) == pytest.approx((interval.low, interval.high))
 
 
-def test_sentences__say_both_verdicts_apart(counts: dict[str, dict[str, Any]]) -> None:
+def test_sentences__name_the_driver_of_the_regulation_and_say_both_verdicts_apart(
+    counts: dict[str, dict[str, Any]],
+) -> None:
     table = pd.DataFrame(list(counts.values()))
-    (found,) = preventability_of(table, GAMES, "naive_vs_speedy")
-    assert found.sentences == [
-        "A reference driver in its place from the start prevents 2 of 3 failures (fuzzy safety model 2, RSS 1).",
-        "Preventable failure rate: 20.0 % of 10 games (95 %: 2.5–55.6 %).",
-        "Taking over when the danger shows, it prevents 1 of 2 collisions (fuzzy safety model 0, RSS 1; full braking "
-        "in the first moment of danger 2).",
-        "Full braking prevents the collision until 0.8 s before it (median).",
-    ]
-    assert found.row["from_start_rate"] == pytest.approx(0.2)
-    assert not preventability_of(table, GAMES, "retrained_vs_speedy")
+    assert sentences_of(table, GAMES, "naive_vs_speedy") == {
+        1: [
+            "Taking over when the danger shows, the careful and competent driver of UN R157 prevents 1 of 2 collisions "
+            "(fuzzy safety model 0, RSS 1; full braking in the first moment of danger 2).",
+            "In its place from the start, the careful and competent driver of UN R157 prevents 2 of 3 failures "
+            "(fuzzy safety model 2, RSS 1): 20.0 % of 10 games (95 %: 2.5–55.6 %).",
+            "Full braking prevents the collision until 0.8 s before it (median).",
+        ]
+    }
+    (row,) = by_regulation(table, "naive_vs_speedy")
+    assert row["from_start_rate"] == pytest.approx(0.2)
+    assert sentences_of(table, GAMES, "retrained_vs_speedy") == {}
