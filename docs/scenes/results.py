@@ -42,8 +42,19 @@ def rows_of(run: Path) -> Iterator[list[str]]:
         answers = questions.set_index("question")["verdict"]
         yield [run.name, str(person), str(seed), alone, beside, goals, naive, retrained, answers["RQ1"], answers["RQ2"]]
     for person, questions in read_csv(over).groupby("persona", sort=False) if over.is_file() else ():
-        answers = questions.set_index("question")["verdict"]
-        yield [run.name, str(person), "all", *[""] * 5, answers["RQ1"], answers["RQ2"]]
+        rows = questions.set_index("question")
+        answers = rows["verdict"]
+        changes = [_points(rows.loc["RQ1"], 1), _points(rows.loc["RQ2"], -1)]
+        yield [run.name, str(person), "all", *[""] * 3, *changes, answers["RQ1"], answers["RQ2"]]
+
+
+def _points(row: pd.Series, sign: int) -> str:
+    """The change of the failures over trainings in points, with its interval. RQ2's difference is that of fewer."""
+    if pd.isna(row["ci_low"]):
+        return ""
+    mean, *ends = (100 * sign * row[name] for name in ("mean_difference", "ci_low", "ci_high"))
+    low, high = sorted(ends)
+    return f"{mean:+.0f} points ({low:+.0f} to {high:+.0f})"
 
 
 def _share(value: float) -> str:

@@ -2,7 +2,8 @@
 
 The others repeat their recorded course. The driver takes the ego over in the first step in which its own rule says that
 the road user that the ego will touch is a danger, and drives from there, reaction time included. The collision counts
-as prevented if the ego touches nothing until `AFTERWARDS_S` after the recorded collision. Vehicles that are behind the
+as prevented if the ego touches nothing until `AFTERWARDS_S` after the recorded collision. What the others do after that
+collision is not recorded, and has two continuations (`assessment.continuation`). Vehicles that are behind the
 ego at that moment are left out: drivers follow a car that brakes, recordings do not.
 
 A human driver would not have followed a course that reacts to nothing either: the verdict is on this course alone.
@@ -16,7 +17,14 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from harness.assessment.recorded_courses import CourseReplay, RecordedCourse, RecordedCourses, course_of, start_of
+from harness.assessment.continuation import Continuation
+from harness.assessment.recorded_courses import (
+    CourseReplay,
+    RecordedCourse,
+    RecordedCourses,
+    course_of,
+    start_of,
+)
 from harness.drivers.car import Car, car_of
 from harness.drivers.protocol import Driver
 from harness.drivers.reference_drivers import REFERENCES, FullBraking, lane_width_of, reference_driver
@@ -63,9 +71,9 @@ class Chance:
     last_step: int | None
 
 
-def collision_of(trace: pd.DataFrame, scene: OpenScene, episode: int) -> Collision | None:
+def collision_of(trace: pd.DataFrame, scene: OpenScene, episode: int, continuation: Continuation) -> Collision | None:
     """The collision that ends the ego's game in a trace; None if it touched no other road user."""
-    course = course_of(trace, scene, AFTERWARDS_S)
+    course = course_of(trace, scene, AFTERWARDS_S, continuation)
     return Collision(episode=episode, course=course) if course.opponent >= 0 else None
 
 

@@ -3,8 +3,8 @@
 It takes SUMO's place in an arena (`sumo.simulation`), so that a driver in the ego's seat meets the same others as in
 the recording, by the same motion, contact and observation. No SUMO runs.
 
-A course is known up to the ego's failure. Afterwards each player keeps its speed and its place in the lane along its
-own route, and each other vehicle keeps its speed and direction.
+A course is known up to the ego's failure. Afterwards each player keeps its speed along its own route, and each other
+vehicle keeps its speed and direction. How a player goes on across the road is not known: see `assessment.continuation`.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
+from harness.assessment.continuation import Continuation
 from harness.environments.recorded import recorded_game
 from harness.evaluation.recorded_game import RecordedGame
 from harness.game.arrays import BoolArray, FloatArray, IntArray
@@ -28,6 +29,7 @@ from harness.road.scene.open_scene import OpenScene
 from harness.sumo.simulation import AtReset, Reading
 
 _POSE = ("x_m", "y_m", "heading_rad", "speed_mps")
+_LATERAL_SPEED_OVER_S = 0.5
 _TOUCHING_M = 0.01  # coordinates in a trace are exact; the margin covers the rounding of rotated boxes
 
 
@@ -58,7 +60,7 @@ class RecordedCourse:
     """The road user that the ego touched: a player P > 0, or P + b for other vehicle b; -1 if it touched none."""
 
 
-def course_of(trace: pd.DataFrame, scene: OpenScene, afterwards_s: float) -> RecordedCourse:
+def course_of(trace: pd.DataFrame, scene: OpenScene, afterwards_s: float, continuation: Continuation) -> RecordedCourse:
     """The course of a recorded game in which the ego failed, continued for a time after the failure.
 
     `trace` has the columns of a trace file. Raises ValueError if the ego did not fail in it.
@@ -76,7 +78,7 @@ def course_of(trace: pd.DataFrame, scene: OpenScene, afterwards_s: float) -> Rec
     others = np.stack([getattr(bodies, name)[:, count:] for name in _POSE], axis=-1)
     return RecordedCourse(
         failed_step=failed,
-        players=np.concatenate((players, _along_routes(quantities, more))),
+        players=np.concatenate((players, _along_routes(quantities, more, continuation))),
         players_present=_held(state.present, more),
         ego_acceleration_mps2=_held(state.acceleration_mps2[:, EGO], more),
         ego_steering_rad=_held(state.steering_rad[:, EGO], more),
@@ -102,11 +104,13 @@ def _straight_on(poses: FloatArray, steps: int, step_s: float) -> FloatArray:
     return np.stack([np.broadcast_to(each, way.shape) for each in columns], axis=-1)
 
 
-def _along_routes(quantities: Quantities, steps: int) -> FloatArray:
-    """[steps, P, 4] the players' poses after each step at constant speed and lateral offset along their routes."""
+def _along_routes(quantities: Quantities, steps: int, continuation: Continuation) -> FloatArray:
+    """[steps, P, 4] the players' poses after each step at constant speed along their routes."""
     state, world = quantities.state, quantities.world
     routes: Routes = world.road.routes
     speed, offset = state.speed_mps[-1], quantities.lateral_offset_m[-1]
+    if continuation is Continuation.MOVING_OVER:
+        offset = offset + _moved_over(quantities, steps)
     station = state.station_m[-1] + speed * world.step_s * np.arange(1, steps + 1)[:, None]
     row = routes.rows(station)
     heading = routes.heading_rad[row]
@@ -114,6 +118,18 @@ def _along_routes(quantities: Quantities, steps: int) -> FloatArray:
     x = routes.x_m[row] - offset * np.sin(heading) + beyond * np.cos(heading)
     y = routes.y_m[row] + offset * np.cos(heading) + beyond * np.sin(heading)
     return np.stack((x, y, heading, np.broadcast_to(speed, station.shape)), axis=-1)
+
+
+def _moved_over(quantities: Quantities, steps: int) -> FloatArray:
+    """[steps, P] how far each player has moved towards the ego's line after each step."""
+    state, world, offset = quantities.state, quantities.world, quantities.lateral_offset_m
+    over = min(round(_LATERAL_SPEED_OVER_S / world.step_s), len(offset) - 1)
+    speed = (offset[-1] - offset[-1 - over]) / (max(over, 1) * world.step_s)
+    heading = world.road.routes.heading_rad[world.road.routes.rows(state.station_m[-1])]
+    away_x, away_y = (each[-1, EGO] - each[-1] for each in (state.x_m, state.y_m))
+    way = away_y * np.cos(heading) - away_x * np.sin(heading)
+    moved = speed * world.step_s * np.arange(1, steps + 1)[:, None]
+    return np.clip(moved, np.minimum(way, 0.0), np.maximum(way, 0.0))
 
 
 def _touched(game: RecordedGame) -> int:

@@ -50,3 +50,11 @@ class Column:
         for end in ("low", "high"):
             what = f"The {end} end of the {interval} of {self.name}."
             yield replace(self, name=f"{self.name}_{end}", meaning=what, source="", label="")
+
+
+EXACT = "95 % Clopper-Pearson interval"
+
+
+def rate(name: str, meaning: str, interval: str = EXACT) -> Iterator[Column]:
+    """The columns of a share of games and of the ends of its interval."""
+    return Column(name, NUMBER, meaning, unit=SHARE).with_interval(interval)

@@ -7,12 +7,26 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from harness.evaluation.attribution_columns import ATTRIBUTION, UNDECIDED
-from harness.evaluation.column import COUNT, FLAG, MAYBE, NUMBER, OF_METRIC, P_VALUE, POINTS, SHARE, TEXT, Column
+from harness.evaluation.column import (
+    COUNT,
+    EXACT,
+    FLAG,
+    MAYBE,
+    NUMBER,
+    OF_METRIC,
+    P_VALUE,
+    POINTS,
+    SHARE,
+    TEXT,
+    Column,
+    rate,
+)
 from harness.evaluation.measured_game import METRICS_OF_CONDUCT, METRICS_OF_GAMES, METRICS_OF_PLAYERS
 from harness.evaluation.over_trainings_columns import OVER_TRAININGS
+from harness.evaluation.preventability_columns import PREVENTABILITY, REFERENCE_DRIVERS
 from harness.evaluation.severity.closeness import CRITERIA
 
-_EXACT, _T = "95 % Clopper-Pearson interval", "95 % t interval"
+_T = "95 % t interval"
 _PAPER = "the paper, section 4.2"
 ARM = Column("arm", TEXT, "The name of the arm, such as naive_vs_speedy.")
 PERSONA = Column("persona", TEXT, "The persona of the non-ego; of an arm with one.")
@@ -47,10 +61,6 @@ def _outcome(role: str, who: str) -> Column:
     return Column(f"{role}_outcome", TEXT, f"How the {who}'s game ended: {kinds}; empty without one.")
 
 
-def _rate(name: str, meaning: str, interval: str = _EXACT) -> Iterator[Column]:
-    return Column(name, NUMBER, meaning, unit=SHARE).with_interval(interval)
-
-
 def _of_player(role: str, whose: str) -> Iterator[Column]:
     for each in METRICS_OF_PLAYERS:
         if whose in each.whose:
@@ -67,7 +77,7 @@ def _means(whose: str) -> Iterator[Column]:
 def _summary() -> Iterator[Column]:
     yield from (ARM, PERSONA, SEED, _EPISODES)
     yield Column("errors", COUNT, "Games that could not be played.")
-    yield from _rate("failure_rate", _FAILED)
+    yield from rate("failure_rate", _FAILED)
     for outcome in ("collision", "rail", "timeout"):
         yield Column(f"{outcome}s", MAYBE, f"Games in which the ego's outcome is {outcome}.")
     for each in _means("ego"):
@@ -75,16 +85,16 @@ def _summary() -> Iterator[Column]:
         if each.name == "mean_speed_mps":
             for end in ("low", "high"):
                 yield Column(f"mean_speed_{end}_mps", NUMBER, f"The {end} end of the {_T} of mean_speed_mps.")
-    interval = f"{_EXACT} (empty with several people)"
-    yield from _rate("non_ego_goal_rate", "Share of the people that reached their goals.", interval)
+    interval = f"{EXACT} (empty with several people)"
+    yield from rate("non_ego_goal_rate", "Share of the people that reached their goals.", interval)
     yield from _means("person")
-    yield from _rate("near_miss_rate", "Share of the games with a near miss, by any criterion.")
+    yield from rate("near_miss_rate", "Share of the games with a near miss, by any criterion.")
     for criterion in CRITERIA:
         meaning = f"Near misses by a {criterion.bound}. A game can meet several criteria."
         yield Column(f"near_misses_by_{criterion.name}", MAYBE, meaning)
     yield Column("person_failures", MAYBE, "Games with person_failed: a person fails in a contact without the ego.")
     yield Column("bystander_failures", MAYBE, "Games with bystander_failed: background traffic does.")
-    yield from _rate("harm_to_others_rate", "Share of the games with harm_to_others: a person or a bystander does.")
+    yield from rate("harm_to_others_rate", "Share of the games with harm_to_others: a person or a bystander does.")
     meaning = "Mean over the games of the strongest braking of the vehicle that follows the ego; empty without one."
     yield Column("follower_max_deceleration_mps2", NUMBER, meaning)
     meaning = "Mean over the collisions of the closing speed with the road user that the ego touched."
@@ -98,13 +108,6 @@ def _summary() -> Iterator[Column]:
 
 
 _STRATEGIES = (Column("ego", TEXT, "The strategy of the ego."), Column("non_ego", TEXT, "That of the non-ego."))
-
-
-def _prevented(verdict: str) -> Iterator[Column]:
-    yield Column(f"{verdict}_judged", COUNT, "Failures with a verdict.")
-    yield Column(f"{verdict}_prevented", COUNT, "Of these, prevented.")
-    yield from _rate(f"{verdict}_share", "prevented / judged.")
-    yield from _rate(f"{verdict}_rate", "prevented / episodes.")
 
 
 _TABLES = {
@@ -222,7 +225,7 @@ _TABLES = {
         Column("population", TEXT, "The population that drove against the ego."),
         *(SEED, PERSONA, _EPISODES),
         Column("errors", COUNT, "Games that could not be played."),
-        *_rate("failure_rate", _FAILED),
+        *rate("failure_rate", _FAILED),
         *(each for each in _means("ego") if each.name in ("mean_speed_mps", "ego_payoff")),
         *(each for each in _means("person") if each.name == "non_ego_payoff"),
     ),
@@ -253,8 +256,8 @@ _TABLES = {
         Column("ci_high", NUMBER, f"The high end of its {_T}.", label="its 95 % high"),
         Column("gap_share", NUMBER, "gap / |payoff|; empty where the payoff is 0.", unit=SHARE),
         *(_P, _P_HOLM),
-        *_rate("ego_failure_rate", "Of the ego in the pair."),
-        *_rate("ego_failure_rate_best_response", "The same with the best response in its place."),
+        *rate("ego_failure_rate", "Of the ego in the pair."),
+        *rate("ego_failure_rate_best_response", "The same with the best response in its place."),
         *Column(
             "failure_difference", NUMBER, "Mean of ego failures with the best response minus without.", unit=POINTS
         ).with_interval(_T),
@@ -266,7 +269,7 @@ _TABLES = {
         *(PERSONA, ARM),
         Column("games", COUNT, "Games that were played and measured."),
         Column("left_out", COUNT, "Episodes of this seed that were not played, not measured, or are missing."),
-        *_rate("failure_rate", _FAILED),
+        *rate("failure_rate", _FAILED),
         *Column("ego_payoff", NUMBER, "Mean payoff of the ego.").with_interval(_T),
         *Column("non_ego_payoff", NUMBER, "Mean payoff of the non-ego.").with_interval(_T),
         Column("ego_mean_speed_mps", NUMBER, "Mean over the games of the ego's mean speed."),
@@ -300,7 +303,7 @@ _TABLES = {
         Column("persona", TEXT, "Of the non-ego: one it was not trained against."),
         Column("non_ego", TEXT, "The non-ego."),
         *_PAIRS,
-        *_rate("failure_rate", _FAILED),
+        *rate("failure_rate", _FAILED),
         Column("naive_failure_rate", NUMBER, "Of the naive ego against the same non-ego, same episodes.", unit=SHARE),
         Column("share_of_naive", NUMBER, "failure_rate / naive_failure_rate; empty where the naive ego never fails."),
         *Column(
@@ -308,33 +311,8 @@ _TABLES = {
         ).with_interval(_T),
         *(_P, _P_HOLM, _VERDICT, _REASON),
     ),
-    "reference_drivers": (
-        *_GAME,
-        Column("driver", TEXT, "The reference driver."),
-        _outcome("ego", "ego"),
-        Column("failed_s", NUMBER, "When the ego failed."),
-        Column("conflict_s", NUMBER, "The first moment at which the driver's rule says danger; empty: never."),
-        Column(
-            "prevented_from_conflict", MAYBE, "1: it prevents the collision from then on, 0: not, empty: no verdict."
-        ),
-        Column("prevented_from_start", MAYBE, "1: driving from the start it reaches the goal, 0: not."),
-        Column(
-            "outcome_from_start",
-            TEXT,
-            "How the game ends with this driver from the start; `on_red`, `wrong_way`: a goal that breaks this rule.",
-        ),
-        Column("preventable_from_s", NUMBER, "First moment from which full braking prevents the collision."),
-        Column("preventable_until_s", NUMBER, "Last moment from which full braking prevents the collision."),
-        Column("error", TEXT, "Why the game could not be played from the start; else empty."),
-    ),
-    "preventability": (
-        *(ARM, PERSONA, SEED),
-        Column("driver", TEXT, "The reference driver."),
-        Column("episodes", COUNT, "Games that were played.", label="games"),
-        Column("failures", COUNT, "Failures of the ego."),
-        *_prevented("from_conflict"),
-        *_prevented("from_start"),
-    ),
+    "reference_drivers": (*_GAME, _outcome("ego", "ego"), *REFERENCE_DRIVERS),
+    "preventability": (ARM, PERSONA, SEED, *PREVENTABILITY),
 }
 TABLES: Mapping[str, Mapping[str, Column]] = {
     table: {column.name: column for column in columns} for table, columns in _TABLES.items()

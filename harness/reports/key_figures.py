@@ -66,7 +66,11 @@ def _preventable(persona: str, tables: RunTables) -> Iterator[KeyFigure]:
         for row in tables.prevented_in(arm):
             verdicts = [
                 f"{row[f'{verdict}_prevented']} of {row[f'{verdict}_judged']} {what}"
-                for verdict, what in (("from_conflict", "from the conflict on"), ("from_start", "from the start"))
+                for verdict, what in (
+                    ("from_conflict", "from the conflict on"),
+                    ("moving_over", "if the other moves on into its line"),
+                    ("from_start", "from the start"),
+                )
                 if row[f"{verdict}_judged"]
             ]
             if verdicts:

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from harness.assessment.conflict_replay import AFTERWARDS_S, Collision, ConflictReplay, collision_of
-from harness.assessment.recorded_courses import RecordedCourse
+from harness.assessment.continuation import Continuation
+from harness.assessment.recorded_courses import RecordedCourse, course_of
 from harness.drivers.reference_drivers import PERSONS, REFERENCES
 from harness.game.arrays import FloatArray
 from harness.game.roles import EGO
@@ -132,8 +133,25 @@ def test_collision_of__knows_the_opponent_of_a_recorded_game(merge: OpenScene) -
     """Both keep their pedals still on the merge: the lanes end in each other, and some of the games collide."""
     games = play(arm(merge, Steady(), Steady()), 6)
     for episode, game in enumerate(games):
-        collision = collision_of(trace(game), merge, episode)
+        collision = collision_of(trace(game), merge, episode, Continuation.IN_ITS_PLACE)
         assert (collision is not None) == (game.record["ego_outcome"] == "collision")
         if collision is not None:
             assert collision.course.opponent == 1
             assert collision.course.failed_step * merge.world.step_s <= game.record["duration_s"] + 1e-9
+
+
+def test_course_of__goes_on_in_its_place_or_into_the_egos_line(merge: OpenScene) -> None:
+    """The other steers into the ego. Afterwards it stays beside the ego's line, or moves on into it."""
+    games = play(arm(merge, Steady(), Steady(wheel=0.05)), 20)
+    hits = [trace(game) for game in games if game.record["ego_outcome"] == "collision"]
+    assert hits
+    for hit in hits:
+        stays, moves = (course_of(hit, merge, AFTERWARDS_S, continuation) for continuation in Continuation)
+        failed = stays.failed_step
+        assert (stays.players[: failed + 1] == moves.players[: failed + 1]).all()
+        assert stays.players[:, EGO] == pytest.approx(moves.players[:, EGO])
+        across_m = np.abs(moves.players[failed:, 1, 1] - moves.players[failed, EGO, 1])  # the road runs along x
+        nearer_m = np.abs(stays.players[failed, 1, 1] - stays.players[failed - 5, 1, 1]) / 5
+        expected_m = np.maximum(across_m[0] - nearer_m * np.arange(len(across_m)), 0.0)
+        assert across_m == pytest.approx(expected_m, abs=1e-3)
+        assert np.ptp(stays.players[failed:, 1, 1]) == pytest.approx(0.0, abs=1e-3)

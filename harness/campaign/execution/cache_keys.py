@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from harness.assessment.continuation import Continuation
 from harness.campaign.plan.stages import (
     AssessmentStage,
     BestOf,
@@ -61,6 +62,7 @@ def _inputs(campaign: OpenCampaign, stage: Stage) -> dict[str, Any]:
             inputs["tunable"] = campaign.ego_driver.searched
         case PreventabilityStage():
             inputs["references"] = reference_identity()
+            inputs["continuations"] = [each.value for each in Continuation]
         case _:
             inputs["episodes"] = document.assessment.episodes
     if isinstance(stage, AssessmentStage | PreventabilityStage) and stage.seed != document.start_seed:

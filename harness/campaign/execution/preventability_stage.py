@@ -14,7 +14,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from harness.assessment.conflict_replay import ConflictReplay, collision_of
+from harness.assessment.conflict_replay import Collision, ConflictReplay, collision_of
+from harness.assessment.continuation import Continuation
 from harness.assessment.rollout import assess
 from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import StageRun
@@ -79,27 +80,34 @@ def _from_conflict(
 ) -> tuple[dict[tuple[int, str], dict[str, Any]], dict[int, float]]:
     """The cells of the verdict from the conflict on, by episode and driver; and when each game failed."""
     reader, step_s, ego = TraceReader(), scene.world.step_s, scene.world.roles[EGO]
-    collisions, failed_s = [], {}
+    collisions: dict[Continuation, list[Collision]] = {each: [] for each in Continuation}
+    failed_s = {}
     for episode in episodes:
         trace = reader.read(traces, episode)
         ended = trace.loc[(trace["player"] == ego) & (trace["outcome"] != ""), "step"]
         failed_s[episode] = float(ended.min()) * step_s
-        if (collision := collision_of(trace, scene, episode)) is not None:
-            collisions.append(collision)
+        for continuation, found in collisions.items():
+            if (collision := collision_of(trace, scene, episode, continuation)) is not None:
+                found.append(collision)
     cells: dict[tuple[int, str], dict[str, Any]] = {}
-    for first in range(0, len(collisions), _COLLISIONS_AT_ONCE):
-        some = collisions[first : first + _COLLISIONS_AT_ONCE]
-        replay = ConflictReplay(scene, some, start_seed)
-        chances = replay.chances()
-        for name, takeovers in replay.takeovers().items():
-            for collision, takeover, chance in zip(some, takeovers, chances, strict=True):
+    for first in range(0, len(collisions[Continuation.IN_ITS_PLACE]), _COLLISIONS_AT_ONCE):
+        part = slice(first, first + _COLLISIONS_AT_ONCE)
+        in_place, moving = (ConflictReplay(scene, collisions[each][part], start_seed) for each in Continuation)
+        chances, over = moving.chances(), moving.takeovers()
+        for name, takeovers in in_place.takeovers().items():
+            some = collisions[Continuation.IN_ITS_PLACE][part]
+            for collision, takeover, worse, chance in zip(some, takeovers, over[name], chances, strict=True):
                 steps = {
                     "conflict_s": takeover.danger_step,
                     "preventable_from_s": chance.first_step,
                     "preventable_until_s": chance.last_step,
                 }
                 times = {name: None if step is None else step * step_s for name, step in steps.items()}
-                cells[collision.episode, name] = {**times, "prevented_from_conflict": int(takeover.prevented)}
+                cells[collision.episode, name] = {
+                    **times,
+                    "prevented_from_conflict": int(takeover.prevented),
+                    "prevented_moving_over": int(worse.prevented),
+                }
     return cells, failed_s
 
 

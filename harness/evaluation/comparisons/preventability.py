@@ -1,7 +1,8 @@
 """Which failures of the ego a reference driver would have prevented: the tables, their counts, and the sentences.
 
 Two verdicts are kept apart (docs/preventability.md). From the conflict on, the reference driver takes over the recorded
-game when its own rule says danger, and the others repeat their recorded course. From the start, it plays the same
+game when its own rule says danger, and the others repeat their recorded course; once they keep their place in the lane
+after the recorded collision, once they move on into the ego's line. From the start, it plays the same
 seeded game from its first step, and the others react. Each driver is counted by itself: what at least one of several
 drivers prevents is no measure of any of them. Sentences name the driver of the regulation first.
 
@@ -22,7 +23,12 @@ from harness.evaluation.tables import table_of
 REGULATION = "careful_and_competent"
 """The reference driver of UN R157, by which failures are called preventable."""
 UPPER_BOUND = "upper_bound"
-_VERDICTS = ("from_conflict", "from_start")
+_VERDICTS = {
+    "from_conflict": "prevented_from_conflict",
+    "moving_over": "prevented_moving_over",
+    "from_start": "prevented_from_start",
+}
+"""The verdicts in preventability.csv, each with its column of reference_drivers.csv."""
 _WORDS = {REGULATION: "careful and competent driver", "fuzzy": "fuzzy safety model", "rss": "RSS"}
 """Reference drivers in prose."""
 
@@ -45,10 +51,10 @@ def count_prevented(games: pd.DataFrame, episodes: pd.DataFrame) -> pd.DataFrame
 
 
 def _verdicts(games: pd.DataFrame, episodes: int) -> dict[str, float]:
-    """The columns of both verdicts, from one row per failure."""
+    """The columns of all verdicts, from one row per failure."""
     cells: dict[str, float] = {}
-    for verdict in _VERDICTS:
-        judged = games[f"prevented_{verdict}"].dropna()
+    for verdict, column in _VERDICTS.items():
+        judged = games[column].dropna()
         prevented = int(judged.sum())
         cells |= {f"{verdict}_judged": len(judged), f"{verdict}_prevented": prevented}
         cells |= rate_cells(f"{verdict}_share", prevented, len(judged))
@@ -80,7 +86,8 @@ def _sentences(drivers: pd.DataFrame, last_chance_s: float) -> Iterator[str]:
     if first["from_conflict_judged"]:
         bound = drivers["from_conflict_prevented"].get(UPPER_BOUND, 0)
         yield (
-            f"Taking over when the danger shows, {name} prevents {_of(first, 'from_conflict')} collisions "
+            f"Taking over when the danger shows, {name} prevents {_of(first, 'from_conflict')} collisions, and "
+            f"{first['moving_over_prevented'] or 'none'} if the other moves on into its line "
             f"({_by_driver(others['from_conflict_prevented'])}; full braking in the first moment of danger {bound})."
         )
     if first["from_start_judged"]:

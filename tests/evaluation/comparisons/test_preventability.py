@@ -24,7 +24,9 @@ def episodes(failed: list[int]) -> pd.DataFrame:
 
 
 def judged(episode: int, driver: str, conflict: int | None, start: int | None, **cells: Any) -> dict[str, Any]:
+    """Nobody prevents anything if the other moves over."""
     verdicts = {"prevented_from_conflict": conflict, "prevented_from_start": start, "error": ""}
+    verdicts["prevented_moving_over"] = None if conflict is None else 0
     return {**ARM, "episode": episode, "driver": driver, "ego_outcome": "collision", **verdicts, **cells}
 
 
@@ -81,8 +83,9 @@ def test_sentences__name_the_driver_of_the_regulation_and_say_both_verdicts_apar
     table = pd.DataFrame(list(counts.values()))
     assert sentences_of(table, GAMES, "naive_vs_speedy") == {
         1: [
-            "Taking over when the danger shows, the careful and competent driver of UN R157 prevents 1 of 2 collisions "
-            "(fuzzy safety model 0, RSS 1; full braking in the first moment of danger 2).",
+            "Taking over when the danger shows, the careful and competent driver of UN R157 prevents 1 of 2 "
+            "collisions, and none if the other moves on into its line (fuzzy safety model 0, RSS 1; full braking in "
+            "the first moment of danger 2).",
             "In its place from the start, the careful and competent driver of UN R157 prevents 2 of 3 failures "
             "(fuzzy safety model 2, RSS 1): 20.0 % of 10 games (95 %: 2.5–55.6 %).",
             "Full braking prevents the collision until 0.8 s before it (median).",
