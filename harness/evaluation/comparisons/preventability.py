@@ -74,13 +74,13 @@ def sentences_of(counts: pd.DataFrame, games: pd.DataFrame, arm: str) -> dict[in
     for seed, rows in counts[counts["arm"] == arm].groupby("seed", sort=False):
         drivers = rows.set_index("driver")
         of_arm = games[(games["arm"] == arm) & (games["seed"] == seed)]
-        last_chance_s = (of_arm["failed_s"] - of_arm["preventable_until_s"]).median()
+        last_chances_s = (of_arm["failed_s"] - of_arm["preventable_until_s"]).dropna()
         if drivers.loc[REGULATION, "failures"]:
-            found[int(seed)] = list(_sentences(drivers, last_chance_s))
+            found[int(seed)] = list(_sentences(drivers, last_chances_s))
     return found
 
 
-def _sentences(drivers: pd.DataFrame, last_chance_s: float) -> Iterator[str]:
+def _sentences(drivers: pd.DataFrame, last_chances_s: pd.Series) -> Iterator[str]:
     first, others = drivers.loc[REGULATION], drivers.drop(index=[REGULATION, UPPER_BOUND], errors="ignore")
     name = f"the {_WORDS[REGULATION]} of UN R157"
     if first["from_conflict_judged"]:
@@ -97,8 +97,8 @@ def _sentences(drivers: pd.DataFrame, last_chance_s: float) -> Iterator[str]:
             f"({_by_driver(others['from_start_prevented'])}): {rate:.1f} % of {first['episodes']} games "
             f"(95 %: {low:.1f}–{high:.1f} %)."
         )
-    if pd.notna(last_chance_s):
-        yield f"Full braking prevents the collision until {last_chance_s:.1f} s before it (median)."
+    if len(last_chances_s):
+        yield f"Full braking prevents the collision until {last_chances_s.median():.1f} s before it (median)."
 
 
 def _of(row: pd.Series, verdict: str) -> str:
