@@ -61,22 +61,20 @@ def _causes(persona: str, tables: RunTables) -> Iterator[KeyFigure]:
 
 
 def _preventable(persona: str, tables: RunTables) -> Iterator[KeyFigure]:
+    verdicts = {
+        "from_conflict": "from the conflict on",
+        "moving_over": "if the other moves on into its line",
+        "from_start": "from the start",
+    }
     lines = []
     for _, made, arm in egos_of(persona, tables):
-        for row in tables.prevented_in(arm):
-            verdicts = [
-                f"{row[f'{verdict}_prevented']} of {row[f'{verdict}_judged']} {what}"
-                for verdict, what in (
-                    ("from_conflict", "from the conflict on"),
-                    ("moving_over", "if the other moves on into its line"),
-                    ("from_start", "from the start"),
-                )
-                if row[f"{verdict}_judged"]
-            ]
-            if verdicts:
-                lines.append(f"{_seed(row['seed'], tables)}{made}: {', '.join(verdicts)}")
-    title = "Preventable by the careful and competent driver of UN R157"
-    yield KeyFigure(title=title, lines=lines)
+        rows = tables.prevented_in(arm)
+        judged = {verdict: sum(row[f"{verdict}_judged"] for row in rows) for verdict in verdicts}
+        prevented = {verdict: sum(row[f"{verdict}_prevented"] for row in rows) for verdict in verdicts}
+        clauses = [f"{prevented[each]} of {judged[each]} {words}" for each, words in verdicts.items() if judged[each]]
+        if clauses:
+            lines.append(f"{made}: {', '.join(clauses)}")
+    yield KeyFigure(title="Preventable by the careful and competent driver of UN R157", lines=lines)
 
 
 def _severity(persona: str, tables: RunTables) -> Iterator[KeyFigure]:

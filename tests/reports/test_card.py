@@ -7,6 +7,7 @@ import pytest
 
 from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.strategies import Arm, NaiveEgo, PersonaNonEgo, RetrainedEgo, against_persona
+from harness.evaluation.tables import table_of
 from harness.reports.key_figures import (
     HARM_TO_OTHERS,
     NEAR_MISSES,
@@ -60,6 +61,19 @@ def test_near_misses__of_an_ego_without_failures_are_on_its_card():
         "57 of 60 games of the retrained ego (95 %): 57 by time to collision of at most 1.5 s",
     ]
     assert figure.warns
+
+
+def test_preventable__is_what_the_driver_of_the_regulation_prevents_over_all_seeds():
+    judged = {"episodes": 30, "failures": 4, "from_conflict_judged": 3, "moving_over_judged": 3, "from_start_judged": 4}
+    prevented = {"from_conflict_prevented": 2, "moving_over_prevented": 1, "from_start_prevented": 3}
+    row = {"arm": "naive_vs_speedy", "persona": "speedy", "driver": "careful_and_competent", **judged, **prevented}
+    others = {"driver": "rss", "from_conflict_prevented": 3, "moving_over_prevented": 3, "from_start_prevented": 4}
+    rows = [row | {"seed": 1}, row | {"seed": 1} | others, row | {"seed": 2}]
+    run = RunTables(**campaign(personas=["speedy"]), preventability=table_of("preventability", rows))
+    figure = figures_of(run)["Preventable by the careful and competent driver of UN R157"]
+    assert figure.lines == [
+        "naive ego: 4 of 6 from the conflict on, 2 of 6 if the other moves on into its line, 6 of 8 from the start"
+    ]
 
 
 @pytest.mark.parametrize(("share", "label", "tone"), [(0.95, PARTLY, "open"), (0.0, "Yes", "mended")])
