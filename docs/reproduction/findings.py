@@ -1,193 +1,137 @@
-"""The findings of a run of docs/reproduction/five-seeds.toml, seed by seed, against the expected ones.
+"""A run of docs/reproduction/ten-seeds.toml, seed by seed, against what protocol.toml expects of it.
 
-    python docs/reproduction/findings.py reports/five-seeds
+    python docs/reproduction/findings.py reports/ten-seeds
 
-prints the table of docs/reproduction.md from the run folder's CSV files. It plays only the games of a
-law-abiding driver in the speedy driver's place: SUMO drives the non-ego against each seed's naive ego, on the speedy
-driver's payoff.
+prints the table of docs/reproduction.md from the CSV files of the run folder. It refuses a run with other training
+seeds, or of personas or a scene with other hashes, than the protocol names.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import json
+import sys
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
-import numpy as np
 import pandas as pd
 import typer
+from pydantic import Field, model_validator
 
-from harness.assessment.rollout import SeatedArm, assess
-from harness.config.persona import Persona
-from harness.config.toml_reading import read_document
-from harness.drivers.mixture import mixture_of
-from harness.drivers.policy_file import LearnedDriver, read_policy
-from harness.drivers.sumo import SumoDriver
-from harness.road.scene.open_scene import open_scene
+from harness.config.toml_reading import Document, read_document
 
-ROOT = Path(__file__).parents[2]
-PERSONAS = ("paper_speedy", "paper_distracted")
-ALPHA = 0.01
+PROTOCOL = Path(__file__).with_name("protocol.toml")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Tables:
-    """The tables of a run, restricted to one training seed."""
+class Expected(Document):
+    """One expectation: a quantity of a training seed, and the range in which it is to be."""
 
-    episodes: pd.DataFrame
-    comparisons: pd.DataFrame
-    lawful_payoff: float
-    limit_mps: float
+    quantity: Literal["failures", "speed_change", "goals", "p_holm"]
+    """The share of games in which the ego fails; the change of its mean speed against naive_alone; the share of games
+    in which the person reaches its goal; the p-value of the question about failures, after Holm's correction."""
+    arm: str = ""
+    question: str = ""
+    persona: str = ""
+    least: float | None = None
+    most: float | None = None
 
-    def mean(self, arm: str, column: str) -> float:
-        """Mean over the arm's episodes that were played."""
-        rows = self.episodes[(self.episodes["arm"] == arm) & self.episodes["error"].isna()]
-        return float(rows[column].astype(float).mean())
+    @model_validator(mode="after")
+    def _is_whole(self) -> Expected:
+        if (self.quantity == "p_holm") != bool(self.question and self.persona) or bool(self.arm) == bool(self.question):
+            raise ValueError("p_holm has `question` and `persona`, each other quantity has `arm`")
+        if self.least is None and self.most is None:
+            raise ValueError("nothing is expected: give `least` or `most`")
+        return self
 
-    def failures(self, arm: str) -> float:
-        """Share of the arm's games in which the ego failed."""
-        return self.mean(arm, "ego_failed")
+    @property
+    def what(self) -> str:
+        """In words."""
+        words = {"failures": "failures", "speed_change": "speed against naive_alone", "goals": "the person's goal"}
+        return f"{self.arm}: {words[self.quantity]}" if self.arm else f"{self.question} {self.persona}: p after Holm"
 
-    def speed(self, arm: str) -> float:
-        """The ego's mean speed in the arm, m/s."""
-        return self.mean(arm, "ego_mean_speed_mps")
+    @property
+    def bound(self) -> str:
+        """The range in words."""
+        least, most = (None if end is None else self.shown(end) for end in (self.least, self.most))
+        if least is None or most is None:
+            return f"at least {least}" if most is None else f"at most {most}"
+        return f"{least} to {most}"
 
-    def goals(self, arm: str) -> float:
-        """Share of the arm's games in which the non-ego reached its goal."""
-        rows = self.episodes[self.episodes["arm"] == arm]
-        return float((rows["non_ego_outcome"] == "goal").mean())
+    def value(self, episodes: pd.DataFrame, comparisons: pd.DataFrame) -> float:
+        """The quantity in the tables of one training seed."""
+        games = episodes[(episodes["arm"] == self.arm) & episodes["error"].isna()]
+        match self.quantity:
+            case "failures":
+                return float(games["ego_failed"].mean())
+            case "speed_change":
+                alone = episodes[(episodes["arm"] == "naive_alone") & episodes["error"].isna()]
+                return float(games["ego_mean_speed_mps"].mean() / alone["ego_mean_speed_mps"].mean()) - 1.0
+            case "goals":
+                return float((episodes.loc[episodes["arm"] == self.arm, "non_ego_outcome"] == "goal").mean())
+            case "p_holm":
+                rows = comparisons[comparisons["metric"] == "failure"].set_index(["question", "persona"])
+                return float(rows.loc[(self.question, self.persona), "p_holm"])
 
-    def p(self, question: str, persona: str, column: str) -> float:
-        """p of the question about failures. `column`: `p_value`, or `p_holm` with Holm's correction."""
-        rows = self.comparisons
-        rows = rows[(rows["question"] == question) & (rows["persona"] == persona) & (rows["metric"] == "failure")]
-        return float(rows[column].iloc[0])
+    def holds(self, value: float) -> bool:
+        """Whether a value is in the range. A test that could not be made, NaN, is not."""
+        least, most = (-float("inf") if self.least is None else self.least, self.most)
+        return bool(least <= value <= (float("inf") if most is None else most))
 
-
-@dataclass(frozen=True, kw_only=True)
-class Finding:
-    """A row: a value of a run and its expected range."""
-
-    what: str
-    bound: str
-    """The expected range, in words."""
-    value: Callable[[Tables], float]
-    holds: Callable[[float], bool]
-    form: str = "{:.0%}"
-    """Format of the value."""
-
-
-def findings() -> list[Finding]:
-    """All rows, in the order of the page."""
-    rows = [
-        _failure_rate("naive_alone", "0", lambda rate: rate == 0.0),
-        _failure_rate("naive_vs_sumo", "≤ 3 %", lambda rate: rate <= 0.03),
-        _failure_rate("naive_vs_paper_speedy", "≥ 20 %", lambda rate: rate >= 0.20),
-        Finding(
-            what="naive_vs_paper_speedy: speed against naive_alone",
-            bound="lower",
-            value=lambda tables: tables.speed("naive_vs_paper_speedy") / tables.speed("naive_alone") - 1.0,
-            holds=lambda change: change < 0.0,
-            form="{:+.1%}",
-        ),
-        _failure_rate("retrained_vs_paper_speedy", "≤ 3 %", lambda rate: rate <= 0.03),
-        Finding(
-            what="retrained_vs_paper_speedy: speed against naive_alone",
-            bound="within 5 %",
-            value=lambda tables: tables.speed("retrained_vs_paper_speedy") / tables.speed("naive_alone") - 1.0,
-            holds=lambda change: abs(change) <= 0.05,
-            form="{:+.1%}",
-        ),
-        _failure_rate("naive_vs_paper_distracted", "≥ 12 %", lambda rate: rate >= 0.12),
-        _failure_rate("retrained_vs_paper_distracted", "≤ 5 %", lambda rate: rate <= 0.05),
-        *(_failure_rate(f"retrained_alone_{persona}", "0", lambda rate: rate == 0.0) for persona in PERSONAS),
-        _goal_rate("paper_speedy_alone: goal", "≥ 97 %", 0.97),
-        _goal_rate("paper_distracted_alone: goal", "≥ 80 %", 0.80),
-        _goal_rate("naive_vs_paper_speedy: its own goal", "≥ 60 %", 0.60),
-        Finding(
-            what="paper_speedy_alone: speed against the limit",
-            bound="+5 to +30 %",
-            value=lambda tables: tables.mean("paper_speedy_alone", "non_ego_mean_speed_mps") / tables.limit_mps - 1.0,
-            holds=lambda change: 0.05 <= change <= 0.30,
-            form="{:+.1%}",
-        ),
-        Finding(
-            what="naive_vs_paper_speedy: its payoff less a law-abiding driver's",
-            bound="> 0",
-            value=lambda tables: tables.mean("naive_vs_paper_speedy", "non_ego_payoff") - tables.lawful_payoff,
-            holds=lambda difference: difference > 0.0,
-            form="{:+.1f}",
-        ),
-    ]
-    return rows + [
-        _significance(question, persona, column, word)
-        for question in ("RQ1", "RQ2")
-        for persona in PERSONAS
-        for column, word in (("p_value", "p"), ("p_holm", "Holm-corrected p"))
-    ]
+    def shown(self, value: float) -> str:
+        """A value of the quantity as text."""
+        return (
+            f"{value:.2g}" if self.quantity == "p_holm" else f"{value:+.1%}" if "speed" in self.what else f"{value:.0%}"
+        )
 
 
-def _failure_rate(arm: str, bound: str, holds: Callable[[float], bool]) -> Finding:
-    return Finding(what=f"{arm}: failures", bound=bound, value=lambda tables: tables.failures(arm), holds=holds)
+class Protocol(Document):
+    """The document protocol.toml."""
 
+    seeds: list[int]
+    sha256: dict[str, str]
+    """By the name of a file that the run reads."""
+    expected: list[Expected] = Field(min_length=1)
 
-def _goal_rate(what: str, bound: str, least: float) -> Finding:
-    arm = what.partition(":")[0]
-    return Finding(what=what, bound=bound, value=lambda tables: tables.goals(arm), holds=lambda rate: rate >= least)
-
-
-def _significance(question: str, persona: str, column: str, word: str) -> Finding:
-    return Finding(
-        what=f"{question} {persona}: {word} of failure",
-        bound=f"< {ALPHA}",
-        value=lambda tables: tables.p(question, persona, column),
-        holds=lambda p: p < ALPHA,
-        form="{:.2g}",
-    )
+    def deviations(self, manifest: dict[str, object]) -> Iterator[str]:
+        """In what a run is not the one that the protocol is about."""
+        if manifest["seeds"] != self.seeds:
+            yield f"training seeds {manifest['seeds']}, the protocol has {self.seeds}"
+        hashes = {Path(name).name: value for name, value in dict(manifest["hashes"]).items()}  # type: ignore[call-overload]
+        for name, value in self.sha256.items():
+            if hashes.get(name) != value:
+                yield f"{name} has SHA-256 {hashes.get(name)}, the protocol has {value}"
 
 
 def main(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="The run folder, such as reports/five-seeds.")],
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="The run folder, such as reports/ten-seeds.")],
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Also write the table as CSV.")] = None,
 ) -> None:
-    """Print the table of findings as Markdown, a column per training seed."""
-    episodes, comparisons = pd.read_csv(run / "episodes.csv"), pd.read_csv(run / "comparisons.csv")
-    seeds = sorted(episodes["seed"].unique())
-    count = int((episodes["arm"] == "naive_alone").sum() / len(seeds))
-    start_seed, tables = int(episodes["seed"].iloc[0]), {}
-    for seed in seeds:
-        lawful_payoff, limit_mps = _play_lawful_driver(run, int(seed), start_seed, count)
-        tables[seed] = Tables(
-            episodes=episodes[episodes["seed"] == seed],
-            comparisons=comparisons[comparisons["seed"] == seed],
-            lawful_payoff=lawful_payoff,
-            limit_mps=limit_mps,
-        )
-    print("| finding | expected | " + " | ".join(f"seed {seed}" for seed in seeds) + " | held |")
+    """Print what was expected and what was found as Markdown, a column per training seed."""
+    protocol = read_document(PROTOCOL, Protocol)
+    if deviations := list(protocol.deviations(json.loads((run / "manifest.json").read_text(encoding="utf-8")))):
+        sys.exit("\n".join(f"{run}: {each}" for each in deviations))
+    table = findings(protocol, pd.read_csv(run / "episodes.csv"), pd.read_csv(run / "comparisons.csv"))
+    seeds = [f"seed_{seed}" for seed in protocol.seeds]
+    print("| quantity | expected | " + " | ".join(name.replace("_", " ") for name in seeds) + " | held |")
     print("| --- | --- |" + " --- |" * (len(seeds) + 1))
-    rows = []
-    for finding in findings():
-        values = {seed: finding.value(tables[seed]) for seed in seeds}
-        held = sum(finding.holds(value) for value in values.values())
-        shown = " | ".join(finding.form.format(value) for value in values.values())
-        print(f"| {finding.what} | {finding.bound} | {shown} | {held} of {len(seeds)} |")
-        row = {"what": finding.what, "was_to_be": finding.bound}
-        rows.append({**row, **{f"seed_{seed}": value for seed, value in values.items()}, "held": held})
+    for expected, row in zip(protocol.expected, table.to_dict("records"), strict=True):
+        shown = " | ".join(expected.shown(row[name]) for name in seeds)
+        print(f"| {row['what']} | {row['expected']} | {shown} | {row['held']} of {len(seeds)} |")
     if out is not None:
-        pd.DataFrame(rows).to_csv(out, index=False)
+        table.to_csv(out, index=False)
 
 
-def _play_lawful_driver(run: Path, seed: int, start_seed: int, episodes: int) -> tuple[float, float]:
-    """The mean payoff of SUMO's driver in the speedy driver's place, on its terms, and the speed limit in m/s."""
-    scene = open_scene(ROOT / "networks" / "paper_merge")
-    careful, speedy = (read_document(ROOT / "personas" / f"{n}.toml", Persona) for n in ("careful", "paper_speedy"))
-    naive = LearnedDriver(read_policy(run / "policies" / f"naive-seed{seed}"), careful.decisions == "sampled")
-    drivers = (mixture_of(naive, careful), mixture_of(SumoDriver(), speedy))
-    arm = SeatedArm(name="lawful", scene=scene, drivers=drivers, seed=start_seed)
-    payoffs = [game.record["non_ego_payoff"] for game in assess(arm, episodes)]
-    routes = scene.world.road.routes
-    return float(np.mean(payoffs)), float(routes.speed_limit_mps[routes.first_row[1]])
+def findings(protocol: Protocol, episodes: pd.DataFrame, comparisons: pd.DataFrame) -> pd.DataFrame:
+    """A row for each expectation: its value for each training seed, and in how many it holds."""
+    rows = []
+    for expected in protocol.expected:
+        values = {
+            f"seed_{seed}": expected.value(episodes[episodes["seed"] == seed], comparisons[comparisons["seed"] == seed])
+            for seed in protocol.seeds
+        }
+        held = sum(map(expected.holds, values.values()))
+        rows.append({"what": expected.what, "expected": expected.bound, **values, "held": held})
+    return pd.DataFrame(rows)
 
 
 if __name__ == "__main__":

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import re
+import hashlib
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 import pytest
+from pydantic import ValidationError
 
 from harness.campaign.preflight import open_campaign
 from harness.config.campaign import Campaign
@@ -17,82 +18,96 @@ from tests.support.repository import REPOSITORY
 from tests.support.scripts import script
 
 FOLDER = REPOSITORY / "docs" / "reproduction"
-PAGE = REPOSITORY / "docs" / "reproduction.md"
 
 findings, sweep = script("reproduction/findings.py"), script("reproduction/sweep.py")
 
-# --- findings ---------------------------------------------------------------------------------------------------------
+# --- the protocol -----------------------------------------------------------------------------------------------------
+
+
+def protocol() -> Any:
+    return read_document(findings.PROTOCOL, findings.Protocol)
 
 
 def game(arm: str, failed: Any, speed: float = 10.0, non_ego: str = "goal", error: str | None = None) -> dict[str, Any]:
-    return {
-        "arm": arm,
-        "ego_failed": failed,
-        "ego_mean_speed_mps": speed,
-        "non_ego_outcome": non_ego,
-        "non_ego_mean_speed_mps": 15.0,
-        "non_ego_payoff": 3.0,
-        "error": error,
-    }
+    cells = {"ego_failed": failed, "ego_mean_speed_mps": speed, "non_ego_outcome": non_ego}
+    return {"arm": arm, "seed": 31, **cells, "error": error}
 
 
-GAMES = [
-    *[game("naive_alone", False, 10.0)] * 4,
-    *[
-        game("naive_vs_paper_speedy", failed, 9.0, "collision" if failed else "goal")
-        for failed in (True, True, False, False)
-    ],
-    game("naive_vs_paper_speedy", None, float("nan"), "error", "the simulator died"),
-    *[game("retrained_vs_paper_speedy", False, 9.4)] * 4,
-]
-
-
-def found_in_games(what: str) -> tuple[float, bool]:
-    """The value of a row of the table in `GAMES`, and whether it is as expected."""
-    rows = pd.DataFrame(
-        [{"question": "RQ1", "persona": "paper_speedy", "metric": "failure", "p_value": 0.02, "p_holm": 0.1}]
-    )
-    tables = findings.Tables(episodes=pd.DataFrame(GAMES), comparisons=rows, lawful_payoff=1.0, limit_mps=12.5)
-    finding = next(each for each in findings.findings() if each.what == what)
-    value = finding.value(tables)
-    return value, finding.holds(value)
+EPISODES = pd.DataFrame(
+    [
+        *[game("naive_alone", False, 10.0)] * 4,
+        *[game("naive_vs_p", failed, 9.0, "collision" if failed else "goal") for failed in (True, True, False, False)],
+        game("naive_vs_p", None, float("nan"), "error", "the simulator died"),
+    ]
+)
+COMPARISONS = pd.DataFrame(
+    [{"question": "RQ1", "persona": "p", "seed": 31, "metric": "failure", "p_holm": 0.02}, {"metric": "mean_speed"}]
+)
 
 
 @pytest.mark.parametrize(
-    ("what", "value", "holds"),
+    ("keys", "value", "holds", "words"),
     [
-        ("naive_alone: failures", 0.0, True),
-        ("naive_vs_paper_speedy: failures", 0.5, True),  # the game with an error is not one of the four
-        ("naive_vs_paper_speedy: speed against naive_alone", -0.1, True),
-        ("retrained_vs_paper_speedy: speed against naive_alone", -0.06, False),
-        ("naive_vs_paper_speedy: its payoff less a law-abiding driver's", 2.0, True),
-        ("RQ1 paper_speedy: p of failure", 0.02, False),
-        ("RQ1 paper_speedy: Holm-corrected p of failure", 0.1, False),
+        # the game with an error is not one of the four
+        ({"quantity": "failures", "arm": "naive_vs_p", "least": 0.5}, 0.5, True, ("failures", "at least 50%")),
+        ({"quantity": "failures", "arm": "naive_vs_p", "most": 0.49}, 0.5, False, ("failures", "at most 49%")),
+        (
+            {"quantity": "speed_change", "arm": "naive_vs_p", "least": -0.2, "most": -0.05},
+            -0.1,
+            True,
+            ("speed against naive_alone", "-20.0% to -5.0%"),
+        ),
+        # it counts as not reached in the game with an error
+        ({"quantity": "goals", "arm": "naive_vs_p", "least": 0.5}, 0.4, False, ("the person's goal", "at least 50%")),
+        ({"quantity": "p_holm", "question": "RQ1", "persona": "p", "most": 0.01}, 0.02, False, ("p", "at most 0.01")),
     ],
 )
-def test_finding__is_computed_from_the_games_without_errors(what: str, value: float, holds: bool) -> None:
-    assert found_in_games(what) == (pytest.approx(value), holds)
+def test_expected__is_computed_from_the_games_without_errors(
+    keys: dict[str, Any], value: float, holds: bool, words: tuple[str, str]
+) -> None:
+    expected = findings.Expected(**keys)
+    found = expected.value(EPISODES, COMPARISONS)
+    assert (found, expected.holds(found)) == (pytest.approx(value), holds)
+    assert words[0] in expected.what
+    assert expected.bound == words[1]
 
 
-def test_finding__a_goal_rate_counts_a_game_with_an_error_as_not_reached() -> None:
-    assert found_in_games("naive_vs_paper_speedy: its own goal") == (pytest.approx(0.4), False)
+def test_expected__a_test_that_could_not_be_made_does_not_hold() -> None:
+    assert not findings.Expected(quantity="p_holm", question="RQ1", persona="p", most=0.01).holds(float("nan"))
 
 
-def test_page__shows_the_stored_findings() -> None:
-    stored = pd.read_csv(FOLDER / "findings.csv").set_index("what")
-    shown = {cells[0]: cells[1:] for cells in rows_of(PAGE) if cells[0] in stored.index}
-    assert set(shown) == set(stored.index) == {each.what for each in findings.findings()}
-    for each in findings.findings():
-        row = stored.loc[each.what]
-        seeds = [each.form.format(row[name]) for name in stored.columns if name.startswith("seed_")]
-        assert shown[each.what] == [each.bound, *seeds, f"{row['held']} of {len(seeds)}"], each.what
-        assert row["held"] == sum(each.holds(row[name]) for name in stored.columns if name.startswith("seed_"))
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {"quantity": "failures", "arm": "naive_alone"},
+        {"quantity": "p_holm", "arm": "naive_alone", "most": 0.1},
+        {"quantity": "failures", "question": "RQ1", "persona": "p", "most": 0.1},
+    ],
+)
+def test_expected__must_be_whole(keys: dict[str, Any]) -> None:
+    with pytest.raises(ValidationError):
+        findings.Expected(**keys)
 
 
-def rows_of(page: Path) -> list[list[str]]:
-    """The cells of every row of every table of a Markdown page."""
-    lines = [line for line in page.read_text(encoding="utf-8").splitlines() if line.startswith("| ")]
-    return [[cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in lines]
+def test_protocol__is_about_the_files_that_are_here_and_the_arms_of_its_campaign() -> None:
+    campaign = open_campaign(FOLDER / "ten-seeds.toml")
+    assert campaign.document.seeds == protocol().seeds
+    files = {file.name: file for file in (*(REPOSITORY / "personas").iterdir(), *campaign.scene.folder.iterdir())}
+    for name, value in protocol().sha256.items():
+        assert hashlib.sha256(files[name].read_bytes()).hexdigest() == value, name
+    planned = {stage.id.partition("-seed")[0] for stage in campaign.stages}
+    assert {each.arm for each in protocol().expected if each.arm} <= planned
+    people = {persona.name for persona in campaign.personas}
+    assert {each.persona for each in protocol().expected if each.persona} == people
+
+
+def test_protocol__is_not_about_a_run_of_other_seeds_or_files() -> None:
+    manifest = {"seeds": protocol().seeds, "hashes": {f"a/{name}": value for name, value in protocol().sha256.items()}}
+    assert list(protocol().deviations(manifest)) == []
+    changed = manifest | {"seeds": [1], "hashes": manifest["hashes"] | {"a/careful.toml": "0"}}
+    seeds, persona = protocol().deviations(changed)
+    assert seeds.startswith("training seeds [1], the protocol has [31,")
+    assert persona.startswith("careful.toml has SHA-256 0, the protocol has ")
 
 
 # --- the sweep --------------------------------------------------------------------------------------------------------
