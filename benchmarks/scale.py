@@ -16,6 +16,7 @@ from benchmarks.campaign import TimedStage, makespan_s
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage
 from harness.config.campaign import Campaign
+from harness.evaluation.strategies import NaiveEgo
 from harness.game.roles import EGO
 
 SCENES, SEEDS, ROUNDS = 12, 5, 4
@@ -117,7 +118,7 @@ def _plan(personas: Sequence[str], seeds: int, rounds: int) -> list[Stage]:
 
 def _kind(stage: Stage) -> str:
     if isinstance(stage, TrainingStage):
-        return "naive" if not stage.opponent else "ego" if stage.learner == EGO else "non_ego"
+        return "naive" if stage.strategy == NaiveEgo() else "ego" if stage.learner == EGO else "non_ego"
     assert isinstance(stage, AssessmentStage)
     return "pair" if all(stage.sides) else "alone"
 
