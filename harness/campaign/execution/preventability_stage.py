@@ -102,7 +102,7 @@ def _from_conflict(
                     "preventable_from_s": chance.first_step,
                     "preventable_until_s": chance.last_step,
                 }
-                times = {name: None if step is None else step * step_s for name, step in steps.items()}
+                times = {column: None if step is None else step * step_s for column, step in steps.items()}
                 cells[collision.episode, name] = {
                     **times,
                     "prevented_from_conflict": int(takeover.prevented),
