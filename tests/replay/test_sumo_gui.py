@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import subprocess
@@ -50,11 +51,14 @@ def photograph(folder: Path, screen: str, steps: list[int]) -> list[np.ndarray]:
     (folder / "view.xml").write_text(settings.replace("</viewsettings>", taken + "</viewsettings>"))
     command = [str(find_sumo_gui()), "-c", str(folder / "scene.sumocfg"), "--quit-on-end"]
     environment = os.environ | {"DISPLAY": screen}
-    for _ in range(3):  # SUMO-GUI dies of SIGSEGV now and then
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300, check=False)
-        if done.returncode >= 0:
-            break
-    assert done.returncode == 0, done.stderr
+    for _ in range(5):  # SUMO-GUI dies of SIGSEGV or does not end now and then
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
+            if done.returncode >= 0:
+                assert done.returncode == 0, done.stderr
+                break
+    else:
+        pytest.fail("SUMO-GUI died or did not end in five attempts")
     return [np.asarray(Image.open(file).convert("RGB")).astype(int) for file in files]
 
 
