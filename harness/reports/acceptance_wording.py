@@ -53,12 +53,23 @@ def acceptance_lines(checks: Sequence[Check], seeds: int) -> list[Line]:
 def sentence(check: Check) -> str:
     """What was measured and where, the end of the interval, the bound, and what the value is made of."""
     if not check.measured:
-        return "not measured" if check.games else f"not measured: {check.arm} was not played"
+        reason = check.detail or ("" if check.games else f"{check.arm} was not played")
+        return f"not measured: {reason}" if reason else "not measured"
     value, limit, allowed = (_value(check.bound, each) for each in (check.value, check.limit, check.allowed))
     words = (
         f"{value} in {check.games:,} games of {check.arm}; with {SURE} confidence at most {limit}; allowed: {allowed}"
     )
     return f"{words}; {check.detail}" if check.detail else words
+
+
+def by_sentence(lines: Sequence[Line]) -> list[Line]:
+    """The lines, those that say the same in one: its title names them all."""
+    titles: dict[tuple[bool, str], list[str]] = {}
+    for line in lines:
+        titles.setdefault((line.passed, line.sentence), []).append(line.title)
+    return [
+        Line(passed=passed, title="; ".join(same), sentence=sentence) for (passed, sentence), same in titles.items()
+    ]
 
 
 def headline(checks: Sequence[Check]) -> str:

@@ -22,7 +22,7 @@ from harness.reports.differences import statistics
 from harness.reports.game_links import GameLinks
 from harness.reports.human_ranges import crashes_alone
 from harness.reports.key_figures import card_verdict, egos_of, key_figures, portrait
-from harness.reports.numbers import MISSING, number, percent, sure
+from harness.reports.numbers import number, percent, sure
 from harness.reports.run_tables import QUESTIONS, Row, RunTables, failures, failures_of, played
 from harness.reports.scope_wording import over_trainings_statistics
 from harness.reports.verdict_wording import answer
@@ -51,7 +51,6 @@ def card(persona: str, place: int, tables: RunTables, links: GameLinks) -> dict[
         "anchor": f"persona-{place}",
         "portrait": portrait(tables.manifest.get("persona_documents", {}).get(persona, {})),
         "worst": links.worst_of({arm: label for arm, label in labels.items() if arm != NAIVE_ALONE.name}),
-        "rates": [_rate(labels[each.arm], each) for each in columns if each.arm in labels],
         "verdicts": [
             card_verdict(
                 question.format(person=tables.person, doing=tables.change.doing), answer(tables, name, persona), figures
@@ -126,19 +125,6 @@ def _paired(persona: str, place: int, before: ArmColumn, after: ArmColumn, table
     )
     note = f"{MOST_LINES} of the {len(pairs):,} episodes are drawn, evenly spaced." if len(pairs) > MOST_LINES else ""
     return paired_figure(pairs, f"paired{place}", alternative, change.made), note
-
-
-def _rate(label: str, column: ArmColumn) -> dict[str, Any]:
-    """One arm's failure rate: large, and each training seed's count, and its value and interval in per cent."""
-    shares = [row["failure_rate"] for row in column.rates.values()]
-    names = ("failure_rate", "failure_rate_low", "failure_rate_high")
-    return {
-        "label": label,
-        "series": column.series,
-        "headline": percent(sum(shares) / len(shares)) if shares else MISSING,
-        "counts": _counts(column.rates) or [NOT_PLAYED],
-        "spans": [[100.0 * row[name] for name in names] for row in column.rates.values()],
-    }
 
 
 def _facts(persona: str, is_changed: bool, tables: RunTables) -> list[tuple[str, Sequence[str]]]:

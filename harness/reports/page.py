@@ -8,7 +8,7 @@ from typing import Any
 from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.unplayed_games import reasons_of
 from harness.reports import human_ranges
-from harness.reports.acceptance_wording import acceptance_lines, headline
+from harness.reports.acceptance_wording import acceptance_lines, by_sentence, headline
 from harness.reports.arm_figures import MOST_DOTS
 from harness.reports.arm_glossary import glossary
 from harness.reports.attribution_section import attribution_section
@@ -16,11 +16,13 @@ from harness.reports.cards import CAUTION, card
 from harness.reports.data_table import table
 from harness.reports.differences import METRIC_WORDS, effect
 from harness.reports.embedding import GameTracks, embedded_games, recorded_document
+from harness.reports.failure_table import failure_table
+from harness.reports.first_answers import first_answers
 from harness.reports.game import game_section
 from harness.reports.game_links import GameLinks
 from harness.reports.learning import learning, searches, stopped
 from harness.reports.manoeuvres import failures_by_cause, marks_of
-from harness.reports.next_steps import first_answers, next_steps
+from harness.reports.next_steps import next_steps
 from harness.reports.page_template import CONTENT_POLICY, ELSEWHERE, LIBRARIES, SCRIPTS, environment_of, sources
 from harness.reports.provenance import asked_alone, command_of, facts, made_by, mixed_versions
 from harness.reports.run_tables import RunTables, unplayed
@@ -59,6 +61,7 @@ def render_page(tables: RunTables, games: Iterable[GameTracks] = (), scene: Mapp
         **_header(tables),
         **_troubles(tables),
         acceptance=_acceptance(tables),
+        failure_table=failure_table(tables, links),
         answers=first_answers(tables, steps),
         attribution=attribution_section(tables, links),
         next_steps=steps,
@@ -132,7 +135,7 @@ def _acceptance(tables: RunTables) -> tuple[bool, str, list[Any]] | None:
     if tables.acceptance is None:
         return None
     lines = acceptance_lines(tables.acceptance, len(tables.seeds))
-    return all(each.passed for each in lines), headline(tables.acceptance), lines
+    return all(each.passed for each in lines), headline(tables.acceptance), by_sentence(lines)
 
 
 def _tables(tables: RunTables) -> dict[str, Any]:

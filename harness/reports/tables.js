@@ -170,7 +170,7 @@ async function equip(table) {
 
 /** Equip the tables of a part of the page that are not folded away. */
 function equipVisible() {
-  for (const table of document.querySelectorAll(".scroll > table:not(.dataTable)")) {
+  for (const table of document.querySelectorAll(".scroll > table:not(.dataTable, #failure-table)")) {
     if (table.closest("details:not([open])") || "begun" in table.dataset) continue;
     table.dataset.begun = "";
     equip(table);

@@ -32,7 +32,7 @@ LABELS = {
     Verdict.NO_DIFFERENCE: "no difference",
     Verdict.ALL_EQUAL: "no t statistic",
     Verdict.NOT_ENOUGH_PAIRS: NOT_ANSWERED,
-    Verdict.NOT_ENOUGH_TRAININGS: NOT_ANSWERED,
+    Verdict.NOT_ENOUGH_TRAININGS: f"{NOT_ANSWERED}: not enough trainings",
     **{verdict: verdict.value for verdict in WITHHELD},
 }
 NO_ROUND_2 = "Round 2 was not played: this ego has nothing to train or to tune."

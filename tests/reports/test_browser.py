@@ -25,14 +25,16 @@ def test_report__opens_from_a_file_without_an_error_or_a_request(opened):
     assert page.seen == []
 
 
-def test_report__the_four_answers_are_on_the_first_screen(opened):
+def test_report__the_table_and_the_answers_are_on_the_first_screen(opened):
     page = opened()
-    questions = ("Did it pass?", "Why does it fail?", "Could it have been prevented?", "What now?")
-    for text in questions:
-        box = page.get_by_text(text).first.bounding_box()
-        assert box["y"] + box["height"] < 900
+    questions = ("Does it pass?", "Why does it fail?", "Does retraining help, and what does it cost?", "What now?")
+    for found in (page.locator("#failure-table"), *map(page.get_by_text, questions)):
+        box = found.first.bounding_box()
+        assert box["y"] + box["height"] < 800
     assert page.get_by_text("Quick run").is_visible()
-    assert page.get_by_text("Against speedy the naive ego fails in 18 of 60 games").is_visible()
+    row = page.locator("#failure-table tr", has=page.get_by_role("rowheader", name="speedy"))
+    assert row.get_by_text("18 of 60").is_visible()
+    assert row.get_by_role("link", name="30 %").get_attribute("href").startswith("#game=naive_vs_speedy")
     assert page.get_by_text("The speedy driver makes the naive ego fail in 18 of 60 games").is_visible()
     assert page.get_by_role("link", name="Watch it here").first.get_attribute("href").startswith("#game=")
 

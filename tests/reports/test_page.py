@@ -161,7 +161,7 @@ def test_words__say_what_the_verdict_is_about_and_of_how_many_tests_it_is_one(se
 def test_words__a_question_that_most_trainings_do_not_answer_says_so():
     arguments = cannot_drive(campaign(personas=["speedy"], seeds=(1, 2, 3)), [1])
     found = answer(RunTables(**arguments), "RQ1", "speedy")
-    assert (found.label, found.about) == ("not answered", "trainings like this")
+    assert (found.label, found.about) == ("not answered: not enough trainings", "trainings like this")
     assert found.sentence == (
         "The question is answered for 2 of 3 trainings, and trainings like this need 3 training seeds. "
         "Each trained pair by itself: yes in 2 of 3."

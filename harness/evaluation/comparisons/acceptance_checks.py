@@ -54,7 +54,7 @@ class Check:
     games: int
     """The games, or pairs of games, in which it was measured."""
     detail: str = ""
-    """What the value is made of, in words; empty: nothing to add."""
+    """What the value is made of, or why it was not measured, in words; empty: nothing to add."""
 
     @property
     def measured(self) -> bool:
@@ -84,10 +84,10 @@ class Evidence:
         """The rows of summary.csv by arm and seed."""
         return {(row["arm"], row["seed"]): row for row in self.summary.to_dict("records")}
 
-    def unanswered(self, persona: str, seed: int) -> bool:
-        """Whether a question is not answered: its row states a reason."""
+    def unanswered(self, persona: str, seed: int) -> str:
+        """Why a question about a persona is not answered; empty where it is."""
         asked = (self.comparisons["persona"] == persona) & (self.comparisons["seed"] == seed)
-        return bool((asked & (self.comparisons["reason"] != "")).any())
+        return next((str(reason) for reason in self.comparisons.loc[asked, "reason"] if reason), "")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,8 +124,8 @@ def judge(
                 subject = Subject(ego=judged_ego(judged, persona, seed, evidence), persona=persona, seed=seed)
                 check = partial(Check, bound=name, persona=persona, seed=seed, allowed=allowed)
                 for measured in _measured(name, subject, evidence):
-                    if evidence.unanswered(persona, seed):
-                        measured = measured._replace(value=np.nan, limit=np.nan, detail="")
+                    if reason := evidence.unanswered(persona, seed):
+                        measured = measured._replace(value=np.nan, limit=np.nan, detail=reason)
                     checks.append(check(**measured._asdict()))
     return checks
 

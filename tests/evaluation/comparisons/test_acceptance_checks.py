@@ -60,8 +60,8 @@ def test_bound__of_players_that_cannot_drive_the_scene_is_not_kept() -> None:
     asked = pd.DataFrame({"persona": ["speedy", "calm"], "seed": [1, 1], "reason": ["speedy can't drive it", ""]})
     run = replace(run, comparisons=asked)
     (check,) = judge({"failure_rate": 0.5}, "last", ["speedy"], [1], run)
-    assert (check.measured, check.passed) == (False, False)
-    assert not run.unanswered("calm", 1)
+    assert (check.measured, check.passed, check.detail) == (False, False, "speedy can't drive it")
+    assert run.unanswered("calm", 1) == ""
 
 
 def test_failure_rate__covers_opponents_of_later_rounds() -> None:

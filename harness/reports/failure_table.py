@@ -1,0 +1,190 @@
+"""The first table of the page: how often each ego fails against each person, on one axis."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from harness.evaluation.comparisons.comparison import rate_cells
+from harness.evaluation.strategies import (
+    Arm,
+    EgoStrategy,
+    NaiveEgo,
+    PersonaNonEgo,
+    ReconfiguredEgo,
+    RetrainedEgo,
+    RobustEgo,
+    SumoNonEgo,
+    against_persona,
+    round_of,
+)
+from harness.game.roles import NON_EGO
+from harness.reports.game_links import GameLinks
+from harness.reports.numbers import NO_SPACE, percent
+from harness.reports.run_tables import Row, RunTables, failures, played
+
+NOBODY, ORDINARY, WORST_KNOWN = "nobody", "SUMO’s driver", "worst known opponent"
+TAKES_OVER = "UN R157’s driver takes over"
+AXES = (0.05, 0.1, 0.2, 0.4, 0.6, 1.0)
+"""The ends that the common axis of failure rates may have."""
+TONES = {
+    "none": "no failure",
+    "small": f"1{NO_SPACE}%",
+    "medium": f"10{NO_SPACE}%",
+    "severe": f"more than 10{NO_SPACE}%",
+    "unknown": "no collision, or not known",
+}
+"""The colours of cells: the probability of a serious injury (MAIS3+) in a collision, by the upper bound of its mean."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cell:
+    """How often one ego fails against one person."""
+
+    rate: str
+    counts: str
+    """Failures and games, over all training seeds."""
+    spans: Sequence[tuple[float, float, float]]
+    """For each training seed the share and its 95 % interval."""
+    tone: str
+    """A key of `TONES`."""
+    game: str = ""
+    """The address of its worst game on the page; empty without one."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Line:
+    """One person, with a cell for each ego; None where they did not meet."""
+
+    person: str
+    cells: Sequence[Cell | None]
+    is_lawful: bool = False
+    """Whether the person does nothing that causes a failure: an ego that fails against it fails by itself."""
+
+    @property
+    def warns(self) -> bool:
+        """Whether an ego fails against a person who does nothing wrong."""
+        return self.is_lawful and any(cell is not None and cell.tone != "none" for cell in self.cells)
+
+
+def failure_table(tables: RunTables, links: GameLinks) -> dict[str, Any] | None:
+    """The columns, lines and axis of the table for the template; None before a game was played."""
+    egos, lines = egos_in(tables), [line for line in _lines(tables, links) if any(line.cells)]
+    cells = [cell for line in lines for cell in line.cells if cell is not None]
+    if not cells:
+        return None
+    columns = [*egos, TAKES_OVER] if len(lines[-1].cells) > len(egos) else list(egos)
+    most = max(high for cell in cells for _, _, high in cell.spans)
+    top = next((end for end in AXES if end >= most), AXES[-1])
+    return {
+        "columns": columns,
+        "lines": lines,
+        "top": top,
+        "ends": [percent(share * top) for share in (0.0, 0.5, 1.0)],
+        "tones": {tone: words for tone, words in TONES.items() if any(cell.tone == tone for cell in cells)},
+    }
+
+
+def egos_in(tables: RunTables) -> dict[str, list[EgoStrategy]]:
+    """The egos of a run by their words, the last round's of each persona together."""
+    egos: dict[str, list[EgoStrategy]] = {tables.naive: [NaiveEgo()]}
+    if changed := [last_ego(tables, persona) for persona in tables.personas if tables.asked("RQ2", persona)]:
+        egos[f"{tables.change.made} ego"] = list(dict.fromkeys(changed))
+    if any(arm.ego == RobustEgo() for arm in tables.arms.values()):
+        egos["robust ego"] = [RobustEgo()]
+    return egos
+
+
+def last_ego(tables: RunTables, persona: str) -> EgoStrategy:
+    """The ego of the last round that was played against a persona's non-ego of round 1."""
+    made = [
+        arm.ego
+        for name, arm in tables.arms.items()
+        if isinstance(arm.ego, RetrainedEgo | ReconfiguredEgo)
+        and arm.ego.against == persona
+        and arm == against_persona(arm.ego, persona)
+        and tables.rates_of(name)
+    ]
+    return max(made, key=round_of, default=tables.change.ego(against=persona))
+
+
+def _lines(tables: RunTables, links: GameLinks) -> Iterator[Line]:
+    egos = list(egos_in(tables).values())
+
+    def cells(non_ego: SumoNonEgo | PersonaNonEgo | None) -> list[Cell | None]:
+        return [_cell([Arm(ego=ego, non_ego=non_ego).name for ego in column], tables, links) for column in egos]
+
+    judged = {persona: _taken_over(persona, tables, links) for persona in tables.personas}
+    last: list[Cell | None] = [None] if any(judged.values()) else []
+    yield Line(person=NOBODY, cells=cells(None) + last, is_lawful=True)
+    yield Line(person=ORDINARY, cells=cells(SumoNonEgo()) + last, is_lawful=True)
+    if (baseline := tables.manifest.get("baseline")) and baseline not in tables.personas:
+        yield Line(person=baseline, cells=cells(PersonaNonEgo(persona=baseline)) + last, is_lawful=True)
+    for persona in tables.personas:
+        own = [[last_ego(tables, persona)] if len(column) > 1 else column for column in egos]
+        met = [_cell([against_persona(ego, persona).name for ego in column], tables, links) for column in own]
+        yield Line(person=persona, cells=[*met, judged[persona]] if last else met)
+    known = [[name for name, arm in tables.arms.items() if arm.ego in column and _is_answer(arm)] for column in egos]
+    yield Line(person=WORST_KNOWN, cells=[_cell(names, tables, links) for names in known] + last)
+
+
+def _is_answer(arm: Arm) -> bool:
+    """Whether a person of a later round, a best response or another ego's opponent plays an arm."""
+    person = arm.non_ego
+    if not isinstance(person, PersonaNonEgo) or person.borrowed is not None:
+        return False
+    is_other = isinstance(arm.ego, RetrainedEgo | ReconfiguredEgo) and arm.ego.against != person.persona
+    return arm.best_response_of == NON_EGO or (arm.best_response_of is None and (person.round > 1 or is_other))
+
+
+def _cell(names: Sequence[str], tables: RunTables, links: GameLinks) -> Cell | None:
+    """The worst of some arms; None if none of them was played."""
+    found = {name: list(tables.rates_of(name).values()) for name in names}
+    found = {name: rows for name, rows in found.items() if rows}
+    if not found:
+        return None
+    name, rows = max(found.items(), key=lambda each: _share(each[1]))
+    failed, games = sum(map(failures, rows)), sum(map(played, rows))
+    return Cell(
+        rate=percent(failed / games),
+        counts=f"{failed:,} of {games:,}",
+        spans=[(row["failure_rate"], row["failure_rate_low"], row["failure_rate_high"]) for row in rows],
+        tone=_tone(rows),
+        game=links.worst(name) if failed else "",
+    )
+
+
+def _share(rows: Sequence[Row]) -> float:
+    return sum(map(failures, rows)) / sum(map(played, rows))
+
+
+def _tone(rows: Sequence[Row]) -> str:
+    if not sum(map(failures, rows)):
+        return "none"
+    known = [row for row in rows if np.isfinite(row["mais3_risk_high"])]
+    if not known:
+        return "unknown"
+    risk = np.average([row["mais3_risk_high"] for row in known], weights=[row["collisions"] for row in known])
+    return "small" if risk <= 0.01 else "medium" if risk <= 0.1 else "severe"
+
+
+def _taken_over(persona: str, tables: RunTables, links: GameLinks) -> Cell | None:
+    """The failures of the naive ego that the driver of UN R157 does not prevent by taking over at the danger."""
+    arm = against_persona(NaiveEgo(), persona).name
+    prevented = {row["seed"]: row["from_conflict_prevented"] for row in tables.prevented_in(arm)}
+    rates = tables.rates_of(arm)
+    if not prevented or any(failures(row) and seed not in prevented for seed, row in rates.items()):
+        return None
+    left = [(failures(row) - prevented.get(seed, 0), played(row)) for seed, row in rates.items()]
+    failed, games = (sum(each) for each in zip(*left, strict=True))
+    shares = [rate_cells("rate", *each) for each in left]
+    return Cell(
+        rate=percent(failed / games),
+        counts=f"{failed:,} of {games:,}",
+        spans=[(each["rate"], each["rate_low"], each["rate_high"]) for each in shares],
+        tone=_tone(list(rates.values())) if failed else "none",
+        game=links.worst(arm) if failed else "",
+    )

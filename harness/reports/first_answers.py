@@ -1,0 +1,124 @@
+"""The sentences of the first screen: why the ego fails, whether that could have been prevented, how severe it is, what
+retraining does and at what price, and what to do now."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.evaluation.rule_book.causes import cause_lines
+from harness.reports.focus import Focus, focus_of
+from harness.reports.key_figures import egos_of
+from harness.reports.next_steps import NextStep
+from harness.reports.numbers import NO_SPACE, number
+from harness.reports.run_tables import RunTables, failures, played
+from harness.reports.severity_wording import severity_clause
+from harness.reports.verdict_wording import answer
+
+MOST_PERSONAS = 3
+"""Personas for which an answer has a line of its own; the verdicts have the others."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FirstAnswer:
+    """A question of the reader, with its answer."""
+
+    question: str
+    lines: Sequence[str]
+    command: str = ""
+    game: str = ""
+    """The key of the game to watch."""
+
+
+def first_answers(tables: RunTables, steps: Sequence[NextStep]) -> list[FirstAnswer]:
+    """The questions in order; empty before a game against a persona was played."""
+    personas = [each for each in tables.personas if tables.rates_of(tables.arms_of("RQ1", each)[1])]
+    if not personas:
+        return []
+    focus = focus_of(tables)
+    told = [focus.persona] if focus is not None and focus.persona else personas[:MOST_PERSONAS]
+    answers = [
+        FirstAnswer(question="Why does it fail?", lines=list(_why(focus, tables))),
+        FirstAnswer(
+            question="Could it have been prevented?", lines=[each for name in told for each in _prevented(name, tables)]
+        ),
+        FirstAnswer(question="How severe is it?", lines=[each for name in told for each in _severe(name, tables)]),
+        FirstAnswer(
+            question=f"Does {tables.change.doing} help, and what does it cost?",
+            lines=[each for name in personas[:MOST_PERSONAS] for each in _retrained(name, tables)],
+        ),
+    ]
+    answers += [
+        FirstAnswer(question="What now?", lines=[step.sentence], command=step.command, game=step.game)
+        for step in steps[:1]
+    ]
+    return [each for each in answers if each.lines]
+
+
+def _why(focus: Focus | None, tables: RunTables) -> Iterator[str]:
+    """The most frequent cause of the failures of the arm that matters most, and of the naive ego against its person."""
+    if focus is None:
+        yield "No ego fails."
+        return
+    arms = {focus.arm: focus.ego}
+    if focus.persona:
+        arms |= {arm: made for _, made, arm in egos_of(focus.persona, tables)}
+    for arm, ego in arms.items():
+        failed, games = _count(arm, tables)
+        against = f" against {focus.persona}" if focus.persona else ""
+        where = against if arm != "naive_vs_sumo" else " against an ordinary driver"
+        if failed:
+            cause = next(iter(cause_lines(tables.causes[tables.causes["arm"] == arm])), "")
+            share, _, words = cause.partition(": ")
+            mostly = f" {share}: {words}." if words else ""
+            yield f"The {ego} fails{where} in {failed} of {games} games.{mostly}"
+        elif arm == focus.arm:
+            yield f"The {ego} does not fail{where}: the broken bound is of another kind."
+
+
+def _prevented(persona: str, tables: RunTables) -> Iterator[str]:
+    """What the driver of the regulation prevents against a persona, for each ego that fails."""
+    clauses = []
+    for _, made, arm in egos_of(persona, tables):
+        failed, _ = _count(arm, tables)
+        judged = tables.prevented_in(arm)
+        conflict, start = (sum(row[f"from_{when}_prevented"] for row in judged) for when in ("conflict", "start"))
+        if failed and judged:
+            clauses.append(f"{conflict} of {failed} of the {made} from the conflict on, {start} from the start")
+        elif failed:
+            clauses.append(f"those of the {made} are not judged")
+    if clauses:
+        yield f"Of the failures against {persona} the driver of UN R157 prevents {'; '.join(clauses)}."
+
+
+def _severe(persona: str, tables: RunTables) -> Iterator[str]:
+    """The severity of the collisions of the last ego that has any."""
+    clauses = [severity_clause(made, list(tables.rates_of(arm).values())) for _, made, arm in egos_of(persona, tables)]
+    for clause in [each for each in clauses if each][-1:]:
+        yield f"{clause[:1].upper()}{clause[1:]}."
+
+
+def _retrained(persona: str, tables: RunTables) -> Iterator[str]:
+    """The verdict on round 2, the failures, and the change of the average speed."""
+    if not tables.asked("RQ2", persona):
+        return
+    naive, changed = tables.arms_of("RQ2", persona)
+    before, after = _count(naive, tables), _count(changed, tables)
+    given = answer(tables, "RQ2", persona)
+    text = f"Against {persona}: {given.label}. {before[0]} of {before[1]} failures become {after[0]} of {after[1]}"
+    faster = _speed_mps(changed, tables) - _speed_mps(naive, tables)
+    if np.isfinite(faster):
+        text += f"; {number(abs(faster), 2)}{NO_SPACE}m/s {'faster' if faster > 0 else 'slower'} on average"
+    yield f"{text}."
+
+
+def _speed_mps(arm: str, tables: RunTables) -> float:
+    speeds = [row["mean_speed_mps"] for row in tables.rates_of(arm).values()]
+    return float(np.mean(speeds)) if speeds else np.nan
+
+
+def _count(arm: str, tables: RunTables) -> tuple[int, int]:
+    rows = tables.rates_of(arm).values()
+    return sum(map(failures, rows)), sum(map(played, rows))

@@ -1,0 +1,172 @@
+"""The first screen: the table of egos and people, the arm that matters most, and the sentences about it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from harness.evaluation.comparisons.acceptance_checks import Check
+from harness.evaluation.strategies import Arm, Borrowed, NaiveEgo, PersonaNonEgo, RetrainedEgo, against_persona
+from harness.evaluation.tables import table_of
+from harness.reports.failure_table import TAKES_OVER, WORST_KNOWN, failure_table
+from harness.reports.first_answers import first_answers
+from harness.reports.focus import focus_of
+from harness.reports.game_links import GameLinks
+from harness.reports.next_steps import next_steps
+from harness.reports.numbers import NO_SPACE
+from harness.reports.run_tables import RunTables
+from tests.support.game_tables import arm, table
+from tests.support.pages import campaign, recomputed
+
+LAWFUL = {"sumo": 0.0}
+"""No failure against the ordinary driver."""
+
+
+def run_of(*, failing=LAWFUL, personas=("speedy",), seeds=(1,), **fields):
+    return RunTables(**campaign(personas=list(personas), failing=dict(failing), seeds=seeds) | fields)
+
+
+def table_in(run):
+    return failure_table(run, GameLinks(embedded=(), episodes=run.episodes))
+
+
+def texts(run):
+    """The cells as text, by person."""
+    return {
+        line.person: [cell and f"{cell.rate}, {cell.counts}".replace(NO_SPACE, " ") for cell in line.cells]
+        for line in table_in(run)["lines"]
+    }
+
+
+def judged(*, failures, prevented, seed=1):
+    counts = {"episodes": 60, "failures": failures, "from_conflict_judged": failures, "from_start_judged": failures}
+    counts |= {"from_conflict_prevented": prevented, "from_start_prevented": 1}
+    counts |= {"moving_over_judged": failures, "moving_over_prevented": 0}
+    return {"arm": "naive_vs_speedy", "persona": "speedy", "driver": "careful_and_competent", "seed": seed, **counts}
+
+
+def with_arms(*added):
+    """A run with more arms of the retrained ego, each with the number of its 60 games that fail."""
+    arguments = campaign(personas=["speedy"], failing=LAWFUL)
+    frames = [arm(each.name, ego_failed=[1] * count + [0] * (60 - count), persona="speedy") for each, count in added]
+    episodes = table_of("episodes", [*arguments["episodes"].to_dict("records"), *table(*frames).to_dict("records")])
+    arguments["arms"] |= {each.name: each for each, _ in added}
+    return RunTables(**recomputed(arguments | {"episodes": episodes}))
+
+
+# --- the table ---------------------------------------------------------------------------------
+
+
+def test_table__has_a_line_for_each_person_and_a_column_for_each_ego():
+    assert texts(run_of()) == {
+        "nobody": ["0 %, 0 of 60", "0 %, 0 of 60"],
+        "SUMO’s driver": ["0 %, 0 of 60", None],
+        "speedy": ["30 %, 18 of 60", "3.3 %, 2 of 60"],
+    }
+    assert table_in(run_of())["columns"] == ["naive ego", "retrained ego"]
+
+
+def test_table__counts_the_games_of_all_trainings_and_shows_the_interval_of_each():
+    line = table_in(run_of(seeds=(1, 2)))["lines"][-1]
+    assert line.cells[0].counts == "36 of 120"
+    assert [round(low, 3) for _, low, _ in line.cells[0].spans] == [0.188, 0.188]  # Clopper-Pearson, 18 of 60
+
+
+def test_table__its_axis_ends_above_every_interval():
+    assert table_in(run_of())["top"] == 0.6  # 18 of 60: to 43.2 %
+    assert table_in(run_of(failing=LAWFUL | {"naive": 0.0, "retrained": 0.0}))["top"] == 0.1  # 0 of 60: to 6 %
+
+
+def test_table__warns_of_an_ego_that_fails_against_who_does_nothing_wrong():
+    assert [line.person for line in table_in(run_of())["lines"] if line.warns] == []
+    assert [line.person for line in table_in(run_of(failing={"sumo": 0.05}))["lines"] if line.warns] == [
+        "SUMO’s driver"
+    ]
+
+
+def test_table__the_driver_of_the_regulation_leaves_the_failures_that_it_does_not_prevent():
+    run = run_of(preventability=table_of("preventability", [judged(failures=18, prevented=12)]))
+    assert table_in(run)["columns"][-1] == TAKES_OVER
+    assert texts(run)["speedy"][-1] == "10 %, 6 of 60"
+    half = run_of(seeds=(1, 2), preventability=table_of("preventability", [judged(failures=18, prevented=12)]))
+    assert TAKES_OVER not in table_in(half)["columns"]  # the failures of seed 2 are not judged
+
+
+def test_table__the_worst_known_opponent_is_of_a_later_round_or_newly_trained():
+    ego = RetrainedEgo(against="speedy")
+    later = Arm(ego=ego, non_ego=PersonaNonEgo(persona="speedy", round=3))
+    newly = replace(against_persona(ego, "speedy"), best_response_of=1)
+    assert WORST_KNOWN not in texts(run_of())
+    assert texts(with_arms((later, 6), (newly, 3)))[WORST_KNOWN] == [None, "10 %, 6 of 60"]
+    assert texts(with_arms((later, 3), (newly, 6)))[WORST_KNOWN] == [None, "10 %, 6 of 60"]
+
+
+def test_table__a_person_with_the_trait_of_another_is_no_opponent():
+    borrowed = PersonaNonEgo(persona="speedy", round=3, borrowed=Borrowed(trait="payoff", of="careful"))
+    assert WORST_KNOWN not in texts(with_arms((Arm(ego=NaiveEgo(), non_ego=borrowed), 6)))
+
+
+# --- the arm that matters most -------------------------------------------------------------------
+
+
+def broken(bound, arm_name):
+    return Check(bound=bound, persona="speedy", seed=1, arm=arm_name, value=0.5, limit=0.6, allowed=0.1, games=60)
+
+
+def test_focus__is_first_the_ordinary_driver_then_the_broken_bound_then_the_last_ego_that_fails():
+    bound = broken("near_miss_rate", "retrained_vs_speedy")
+    assert focus_of(run_of(failing={"sumo": 0.05}, acceptance=[bound])).arm == "naive_vs_sumo"
+    at_bound = focus_of(run_of(acceptance=[bound]))
+    assert (at_bound.arm, at_bound.happens) == (
+        "retrained_vs_speedy",
+        "the ego breaks the bound on near misses against speedy",
+    )
+    assert (
+        focus_of(run_of(acceptance=[replace(bound, limit=0.05)])).happens
+        == "the retrained ego still fails against speedy"
+    )
+    assert focus_of(run_of(failing=LAWFUL | {"retrained": 0.0})).happens == "speedy makes the naive ego fail"
+    assert focus_of(run_of(failing=LAWFUL | {"naive": 0.0, "retrained": 0.0})) is None
+
+
+def test_next_step__is_a_game_of_the_broken_bound():
+    step = next_steps(run_of(acceptance=[broken("near_miss_rate", "naive_vs_speedy")]))[0]
+    assert step.command.startswith("harness replay . naive_vs_speedy ")
+
+
+# --- the sentences ---------------------------------------------------------------------------------
+
+
+def answers(run):
+    given = first_answers(run, next_steps(run))
+    return {each.question: [line.replace(NO_SPACE, " ") for line in each.lines] for each in given}
+
+
+def test_answers__say_how_often_each_ego_fails_and_what_retraining_costs():
+    run = run_of(preventability=table_of("preventability", [judged(failures=18, prevented=12)]))
+    given = answers(run)
+    assert given["Why does it fail?"] == [
+        "The retrained ego fails against speedy in 2 of 60 games.",
+        "The naive ego fails against speedy in 18 of 60 games.",
+    ]
+    assert given["Could it have been prevented?"] == [
+        "Of the failures against speedy the driver of UN R157 prevents 12 of 18 of the naive ego from the conflict on, "
+        "1 from the start; those of the retrained ego are not judged."
+    ]
+    (line,) = given["Does retraining help, and what does it cost?"]
+    assert line.startswith("Against speedy: yes. 18 of 60 failures become 2 of 60; ")
+
+
+def test_answers__a_broken_bound_without_a_failure_is_no_failure():
+    nothing = LAWFUL | {"retrained": 0.0}
+    given = answers(run_of(failing=nothing, acceptance=[broken("near_miss_rate", "retrained_vs_speedy")]))
+    assert (
+        given["Why does it fail?"][0]
+        == "The retrained ego does not fail against speedy: the broken bound is of another kind."
+    )
+
+
+def test_answers__an_ego_that_never_fails_is_told_as_such():
+    given = answers(run_of(failing=LAWFUL | {"naive": 0.0, "retrained": 0.0}))
+    assert given["Why does it fail?"] == ["No ego fails."]
+    assert "Could it have been prevented?" not in given
+    assert first_answers(RunTables(manifest={}), []) == []
