@@ -27,7 +27,7 @@ from harness.cli.output import (
     print_version,
 )
 from harness.cli.pinning import minimise, regression
-from harness.cli.runs import compare, export, realism, replay, serve
+from harness.cli.runs import compare, export, realism, replay, runs, serve
 from harness.cli.scenes import scene_app
 from harness.errors import (
     FAILED,
@@ -181,7 +181,7 @@ def report(run: RunPath, as_json: AsJson = False, quiet: Quiet = False, verbose:
         _end_with(outcome, run, console, as_json)
 
 
-_OF_RUNS = (replay, export, serve, compare, realism, minimise)
+_OF_RUNS = (replay, export, runs, serve, compare, realism, minimise)
 for command in (*_OF_RUNS, new, check, check_driver, regression, schema, columns):
     app.command()(command)
 for name, group in (("persona", persona_app), ("policy", policy_app), ("scene", scene_app)):

@@ -1,4 +1,4 @@
-"""The commands for a run that has ended: `harness replay`, `export`, `serve`, `compare` and `realism`."""
+"""The commands for runs that have ended: `harness replay`, `export`, `runs`, `serve`, `compare` and `realism`."""
 
 from __future__ import annotations
 
@@ -131,26 +131,31 @@ def _episode(text: str) -> int:
 
 
 def serve(
-    run: RunPath,
+    run: Annotated[
+        Path, typer.Argument(metavar="RUN", help="A run folder, such as reports/merge, or a folder of run folders.")
+    ],
     port: Annotated[int, typer.Option(min=0, max=65535, help="The port; 0 takes a free one.")] = 8000,
     open_browser: Annotated[bool, typer.Option("--open", help="Open the page in the default browser.")] = False,
 ) -> None:
     """Show the report of a run with all of its recorded games, also those that its file has no room for.
 
-    The page is at http://127.0.0.1:8000 for this machine alone, until Ctrl-C.
+    Of a folder of run folders, such as reports/: an index of all runs, those that are going on with the time left, each
+    with its report, and comparisons of runs of one ego. The page is at http://127.0.0.1:8000 for this machine alone,
+    until Ctrl-C.
     """
     import webbrowser
 
     from rich.console import Console
 
     from harness.campaign.results.served_report import ServedReport, server_of
+    from harness.campaign.results.served_runs import ServedRuns
     from harness.campaign.storage.run_folder import RunFolder
 
-    console = Console()
+    console, folder = Console(), RunFolder(run)
     with console.status(messages.reading(run)):
-        report = ServedReport(RunFolder(run))
+        served = ServedRuns(run) if folder.is_of_runs else ServedReport(folder)
     try:
-        server = server_of(report.answer, port)
+        server = server_of(served.answer, port)
     except OSError as error:
         reason = error.strerror or str(error)
         raise UsageError.of("--port", str(port), f"can't be opened: {reason}", "another port, or 0") from error
@@ -160,6 +165,32 @@ def serve(
         if open_browser:
             webbrowser.open(address)
         server.serve_forever()
+
+
+def runs(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="The folder that the run folders are in.")] = Path(
+        "reports"
+    ),
+    search: Annotated[
+        str, typer.Option(metavar="TEXT", help="Only runs whose name, ego, scene or a persona contains this text.")
+    ] = "",
+    as_json: AsJson = False,
+) -> None:
+    """List the runs in a folder, the latest first: how far each is, whether its bounds are kept, and the worst arms.
+
+    `harness serve FOLDER` shows the same list as a page with a link to each report.
+    """
+    with output(as_json) as console:
+        from harness.campaign.results.run_index import runs_in
+        from harness.reports.index_page import record_of, terminal_table
+
+        found = [run for run in runs_in(folder) if run.matches(search)]
+        if as_json:
+            print_json([record_of(run) for run in found])
+        elif found:
+            console.print(terminal_table(found))
+        else:
+            print_plain([f"{folder}: there is no run" + (f" that contains {search!r}" if search else "")], console)
 
 
 def compare(
@@ -173,10 +204,14 @@ def compare(
     from rich.console import Console
 
     from harness.campaign.results.compare_runs import compare_runs
+    from harness.files import write_atomically
     from harness.reports.comparison_page import headline
 
     console, page = Console(), out or after / "compare.html"
-    rows = compare_runs(before, after, page)
+    if not page.absolute().parent.is_dir():
+        raise UsageError.of(page, "", f"there is no folder {page.parent}", "create it, or name another file with --out")
+    rows, text = compare_runs(before, after)
+    write_atomically(page, text.encode())
     for run in (before, after):
         say_unchecked(run, console)
     for row in rows:

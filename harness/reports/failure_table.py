@@ -19,7 +19,6 @@ from harness.evaluation.strategies import (
     RobustEgo,
     SumoNonEgo,
     against_persona,
-    round_of,
 )
 from harness.game.roles import NON_EGO
 from harness.reports.game_links import GameLinks
@@ -41,7 +40,7 @@ TONES = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Cell:
+class FailureCell:
     """How often one ego fails against one person."""
 
     rate: str
@@ -56,11 +55,11 @@ class Cell:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Line:
+class PersonLine:
     """One person, with a cell for each ego; None where they did not meet."""
 
     person: str
-    cells: Sequence[Cell | None]
+    cells: Sequence[FailureCell | None]
     is_lawful: bool = False
     """Whether the person does nothing that causes a failure: an ego that fails against it fails by itself."""
 
@@ -91,44 +90,31 @@ def failure_table(tables: RunTables, links: GameLinks) -> dict[str, Any] | None:
 def egos_in(tables: RunTables) -> dict[str, list[EgoStrategy]]:
     """The egos of a run by their words, the last round's of each persona together."""
     egos: dict[str, list[EgoStrategy]] = {tables.naive: [NaiveEgo()]}
-    if changed := [last_ego(tables, persona) for persona in tables.personas if tables.asked("RQ2", persona)]:
+    if changed := [tables.last_ego(persona) for persona in tables.personas if tables.asked("RQ2", persona)]:
         egos[f"{tables.change.made} ego"] = list(dict.fromkeys(changed))
     if any(arm.ego == RobustEgo() for arm in tables.arms.values()):
         egos["robust ego"] = [RobustEgo()]
     return egos
 
 
-def last_ego(tables: RunTables, persona: str) -> EgoStrategy:
-    """The ego of the last round that was played against a persona's non-ego of round 1."""
-    made = [
-        arm.ego
-        for name, arm in tables.arms.items()
-        if isinstance(arm.ego, RetrainedEgo | ReconfiguredEgo)
-        and arm.ego.against == persona
-        and arm == against_persona(arm.ego, persona)
-        and tables.rates_of(name)
-    ]
-    return max(made, key=round_of, default=tables.change.ego(against=persona))
-
-
-def _lines(tables: RunTables, links: GameLinks) -> Iterator[Line]:
+def _lines(tables: RunTables, links: GameLinks) -> Iterator[PersonLine]:
     egos = list(egos_in(tables).values())
 
-    def cells(non_ego: SumoNonEgo | PersonaNonEgo | None) -> list[Cell | None]:
+    def cells(non_ego: SumoNonEgo | PersonaNonEgo | None) -> list[FailureCell | None]:
         return [_cell([Arm(ego=ego, non_ego=non_ego).name for ego in column], tables, links) for column in egos]
 
     judged = {persona: _taken_over(persona, tables, links) for persona in tables.personas}
-    last: list[Cell | None] = [None] if any(judged.values()) else []
-    yield Line(person=NOBODY, cells=cells(None) + last, is_lawful=True)
-    yield Line(person=ORDINARY, cells=cells(SumoNonEgo()) + last, is_lawful=True)
+    last: list[FailureCell | None] = [None] if any(judged.values()) else []
+    yield PersonLine(person=NOBODY, cells=cells(None) + last, is_lawful=True)
+    yield PersonLine(person=ORDINARY, cells=cells(SumoNonEgo()) + last, is_lawful=True)
     if (baseline := tables.manifest.get("baseline")) and baseline not in tables.personas:
-        yield Line(person=baseline, cells=cells(PersonaNonEgo(persona=baseline)) + last, is_lawful=True)
+        yield PersonLine(person=baseline, cells=cells(PersonaNonEgo(persona=baseline)) + last, is_lawful=True)
     for persona in tables.personas:
-        own = [[last_ego(tables, persona)] if len(column) > 1 else column for column in egos]
+        own = [[tables.last_ego(persona)] if len(column) > 1 else column for column in egos]
         met = [_cell([against_persona(ego, persona).name for ego in column], tables, links) for column in own]
-        yield Line(person=persona, cells=[*met, judged[persona]] if last else met)
+        yield PersonLine(person=persona, cells=[*met, judged[persona]] if last else met)
     known = [[name for name, arm in tables.arms.items() if arm.ego in column and _is_answer(arm)] for column in egos]
-    yield Line(person=WORST_KNOWN, cells=[_cell(names, tables, links) for names in known] + last)
+    yield PersonLine(person=WORST_KNOWN, cells=[_cell(names, tables, links) for names in known] + last)
 
 
 def _is_answer(arm: Arm) -> bool:
@@ -140,7 +126,7 @@ def _is_answer(arm: Arm) -> bool:
     return arm.best_response_of == NON_EGO or (arm.best_response_of is None and (person.round > 1 or is_other))
 
 
-def _cell(names: Sequence[str], tables: RunTables, links: GameLinks) -> Cell | None:
+def _cell(names: Sequence[str], tables: RunTables, links: GameLinks) -> FailureCell | None:
     """The worst of some arms; None if none of them was played."""
     found = {name: list(tables.rates_of(name).values()) for name in names}
     found = {name: rows for name, rows in found.items() if rows}
@@ -148,7 +134,7 @@ def _cell(names: Sequence[str], tables: RunTables, links: GameLinks) -> Cell | N
         return None
     name, rows = max(found.items(), key=lambda each: _share(each[1]))
     failed, games = sum(map(failures, rows)), sum(map(played, rows))
-    return Cell(
+    return FailureCell(
         rate=percent(failed / games),
         counts=f"{failed:,} of {games:,}",
         spans=[(row["failure_rate"], row["failure_rate_low"], row["failure_rate_high"]) for row in rows],
@@ -171,7 +157,7 @@ def _tone(rows: Sequence[Row]) -> str:
     return "small" if risk <= 0.01 else "medium" if risk <= 0.1 else "severe"
 
 
-def _taken_over(persona: str, tables: RunTables, links: GameLinks) -> Cell | None:
+def _taken_over(persona: str, tables: RunTables, links: GameLinks) -> FailureCell | None:
     """The failures of the naive ego that the driver of UN R157 does not prevent by taking over at the danger."""
     arm = against_persona(NaiveEgo(), persona).name
     prevented = {row["seed"]: row["from_conflict_prevented"] for row in tables.prevented_in(arm)}
@@ -181,7 +167,7 @@ def _taken_over(persona: str, tables: RunTables, links: GameLinks) -> Cell | Non
     left = [(failures(row) - prevented.get(seed, 0), played(row)) for seed, row in rates.items()]
     failed, games = (sum(each) for each in zip(*left, strict=True))
     shares = [rate_cells("rate", *each) for each in left]
-    return Cell(
+    return FailureCell(
         rate=percent(failed / games),
         counts=f"{failed:,} of {games:,}",
         spans=[(each["rate"], each["rate_low"], each["rate_high"]) for each in shares],

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from harness.evaluation.comparisons.acceptance_checks import Check, worst_of_each
 from harness.evaluation.strategies import NAIVE_ALONE, NAIVE_VS_SUMO, against_persona
 from harness.reports.acceptance_wording import TITLES
-from harness.reports.failure_table import last_ego
 from harness.reports.run_tables import RunTables, failures
 
 
@@ -46,7 +45,7 @@ def _candidates(tables: RunTables) -> Iterator[Focus]:
             failed = _failed(check.arm, tables)
             yield Focus(arm=check.arm, ego="ego", persona=check.persona, happens=happens, failed=failed, check=check)
     changed = f"{tables.change.made} ego"
-    last = [(against_persona(last_ego(tables, each), each).name, each) for each in tables.personas]
+    last = [(against_persona(tables.last_ego(each), each).name, each) for each in tables.personas]
     naive = [(tables.arms_of("RQ1", each)[1], each) for each in tables.personas]
     for arms, ego, happens in (
         (last, changed, "the {ego} still fails against {persona}"),

@@ -21,8 +21,8 @@ def facts(manifest: Mapping[str, Any], seeds: Sequence[int], personas: int) -> l
     assessment, training = campaign.get("assessment", {}), campaign.get("training", {})
     ego = str(campaign.get("ego", {}).get("driver", ""))
     found = [
-        ("Scene", str(campaign.get("scene", "")).rstrip("/").rsplit("/", 1)[-1]),
-        ("Ego", str((manifest.get("ego_driver") or {}).get("in_words") or ego)),
+        ("Scene", scene_of(manifest)),
+        ("Ego", ego_of(manifest)),
         ("Rounds", "" if ego in ("", "learned") else rounds(manifest.get("stages", {}).values())),
         ("Personas", str(personas)),
         ("Training seeds", ", ".join(map(str, manifest.get("seeds", seeds)))),
@@ -34,11 +34,28 @@ def facts(manifest: Mapping[str, Any], seeds: Sequence[int], personas: int) -> l
     return [(label, value) for label, value in found if value]
 
 
+def scene_of(manifest: Mapping[str, Any]) -> str:
+    """The name of the scene of a run."""
+    return str(manifest.get("campaign", {}).get("scene", "")).rstrip("/").rsplit("/", 1)[-1]
+
+
+def ego_of(manifest: Mapping[str, Any]) -> str:
+    """What drives the ego of a run."""
+    ego = str(manifest.get("campaign", {}).get("ego", {}).get("driver", ""))
+    return str((manifest.get("ego_driver") or {}).get("in_words") or ego)
+
+
+def finished_on(manifest: Mapping[str, Any]) -> str:
+    """The date on which the last stage of a run ended; empty before the first."""
+    dates = [each["finished_on"] for each in manifest.get("stages", {}).values() if each.get("finished_on")]
+    return max(dates, default="")
+
+
 def made_by(manifest: Mapping[str, Any]) -> list[str]:
     """How the run was made: the version of the harness and the date of the last stage, where they are known."""
     version = manifest.get("versions", {}).get("harness")
-    dates = [each["finished_on"] for each in manifest.get("stages", {}).values() if each.get("finished_on")]
-    return [*([f"harness {version}"] if version else []), *([f"finished on {max(dates)}"] if dates else [])]
+    date = finished_on(manifest)
+    return [*([f"harness {version}"] if version else []), *([f"finished on {date}"] if date else [])]
 
 
 def command_of(manifest: Mapping[str, Any]) -> str:

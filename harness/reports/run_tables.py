@@ -17,11 +17,13 @@ from harness.evaluation.rule_book.causes import cause_lines
 from harness.evaluation.strategies import (
     NAIVE_ALONE,
     Arm,
+    EgoStrategy,
     NaiveEgo,
     ReconfiguredEgo,
     RetrainedEgo,
     Strategy,
     against_persona,
+    round_of,
 )
 from harness.evaluation.tables import table_of
 
@@ -179,6 +181,18 @@ class RunTables:
         if question == "RQ1":
             return NAIVE_ALONE.name, naive
         return naive, against_persona(self.change.ego(against=persona), persona).name
+
+    def last_ego(self, persona: str) -> EgoStrategy:
+        """The ego of the last round that was played against a persona's non-ego of round 1."""
+        made = [
+            arm.ego
+            for name, arm in self.arms.items()
+            if isinstance(arm.ego, RetrainedEgo | ReconfiguredEgo)
+            and arm.ego.against == persona
+            and arm == against_persona(arm.ego, persona)
+            and self.rates_of(name)
+        ]
+        return max(made, key=round_of, default=self.change.ego(against=persona))
 
     def tests_of(self, question: str, persona: str) -> list[Row]:
         """The rows of `comparisons` on a question about a persona."""

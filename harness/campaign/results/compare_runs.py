@@ -9,17 +9,13 @@ from typing import Any
 
 from harness.campaign.results.read_run import episodes_of
 from harness.campaign.storage.run_folder import RunFolder
-from harness.errors import UsageError
 from harness.evaluation.comparisons.run_comparison import differences_of
-from harness.files import write_atomically
 from harness.reports.comparison_page import ComparedRow, compared_rows, render_comparison
 
 
-def compare_runs(before: Path, after: Path, page: Path) -> list[ComparedRow]:
-    """Compare the games of two run folders and write the page. Raises UsageError for a folder that is no run, one
-    without games, results that were changed, and a page that can't be written."""
-    if not page.absolute().parent.is_dir():
-        raise UsageError.of(page, "", f"there is no folder {page.parent}", "create it, or name another file with --out")
+def compare_runs(before: Path, after: Path) -> tuple[list[ComparedRow], str]:
+    """The differences between the games of two run folders, and the page that shows them. Raises UsageError for a
+    folder that is no run, one without games, and results that were changed."""
     folders = [RunFolder(run) for run in (before, after)]
     manifests = [folder.manifest() for folder in folders]
     games = [episodes_of(folder) for folder in folders]
@@ -29,9 +25,7 @@ def compare_runs(before: Path, after: Path, page: Path) -> list[ComparedRow]:
     significance = manifests[1]["campaign"]["assessment"]["significance"]
     rows = compared_rows(differences_of(games[0], games[1], same_starts), significance)
     runs = list(zip((str(before), str(after)), manifests, strict=True))
-    text = render_comparison(runs, rows, same_starts=same_starts, significance=significance)
-    write_atomically(page, text.encode())
-    return rows
+    return rows, render_comparison(runs, rows, same_starts=same_starts, significance=significance)
 
 
 def _scene(manifest: Mapping[str, Any]) -> dict[str, str]:

@@ -121,6 +121,11 @@ class RunFolder:
         """Whether this is a run's report and tables only, without checksums and what they are made from."""
         return self.manifest_file.is_file() and not self.lock.parent.is_dir()
 
+    @property
+    def is_of_runs(self) -> bool:
+        """Whether this is no run folder, but a folder that contains some."""
+        return not self.manifest_file.is_file() and any(self.path.glob(f"*/{MANIFEST}"))
+
     # --- stages --------------------------------------------------------------------------------------------------
 
     def done(self, stage: str) -> dict[str, Any] | None:

@@ -43,7 +43,7 @@ def report(run: Path) -> object:
 
 
 READERS: dict[str, Callable[[Path], object]] = {
-    "compare": lambda run: compare_runs(run, run, run / "compare.html"),
+    "compare": lambda run: compare_runs(run, run),
     "replay --list": lambda run: game_table(run, GameList()),
     "replay": lambda run: played_game(run, "naive_alone", 0, None),
     "serve": lambda run: ServedReport(RunFolder(run)),

@@ -5,22 +5,20 @@ from __future__ import annotations
 import json
 import shutil
 import socket
-import threading
 import urllib.error
 import urllib.request
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from http.server import ThreadingHTTPServer
+from collections.abc import Iterator
 from ipaddress import ip_address
 from pathlib import Path
 
 import pytest
 
 from harness.campaign.results import served_report
-from harness.campaign.results.served_report import PAGE, ServedReport, server_of
+from harness.campaign.results.served_report import PAGE, ServedReport
 from harness.campaign.storage.run_folder import RunFolder
 from harness.errors import UsageError
 from harness.reports.page_template import CONTENT_POLICY, ELSEWHERE, served_page
+from tests.support.serving import read, serving
 from tests.support.tiny import sumo_run
 
 
@@ -28,23 +26,6 @@ from tests.support.tiny import sumo_run
 def address() -> Iterator[str]:
     with serving(ServedReport(RunFolder(sumo_run())).answer) as server:
         yield f"http://127.0.0.1:{server.server_port}"
-
-
-@contextmanager
-def serving(answer: Callable[[str], tuple[str, bytes] | None]) -> Iterator[ThreadingHTTPServer]:
-    """A server that runs during the block."""
-    with server_of(answer, 0) as server:
-        thread = threading.Thread(target=server.serve_forever, args=(0.02,))
-        thread.start()
-        yield server
-        server.shutdown()
-        thread.join()
-
-
-def read(address: str, **headers: str) -> str:
-    with urllib.request.urlopen(urllib.request.Request(address, headers=headers)) as answer:
-        text: str = answer.read().decode()
-        return text
 
 
 @pytest.mark.slow

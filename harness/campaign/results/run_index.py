@@ -1,0 +1,143 @@
+"""The runs in a folder: how far each is, whether its bounds are kept, and how often its egos fail at worst."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from harness.campaign.plan.stages import AssessmentStage
+from harness.campaign.results.ci_files import RESULT
+from harness.campaign.storage.locks import is_held
+from harness.campaign.storage.manifest import planned
+from harness.campaign.storage.run_folder import MANIFEST, RunFolder
+from harness.campaign.storage.run_log import LOG
+from harness.errors import HarnessError, UsageError
+from harness.evaluation.strategies import NaiveEgo
+from harness.reports.index_page import IndexedRun, WorstCell
+from harness.reports.provenance import ego_of, finished_on, scene_of
+
+_FINISHED = ("done", "settled")
+_LINE = re.compile(r"(?P<time>\S+Z) \S+ +(?P<what>started|done|failed) +(?P<stage>[^\s:]+)")
+
+
+def runs_in(folder: Path) -> list[IndexedRun]:
+    """The runs whose folders are in this one, those of the latest date first. Raises UsageError if it is no folder."""
+    if not folder.is_dir():
+        raise UsageError.of(folder, "", "is not a folder", "name the folder that the run folders are in")
+    found = [_indexed(file.parent) for file in sorted(folder.glob(f"*/{MANIFEST}"))]
+    return sorted(sorted(found, key=lambda run: run.name), key=lambda run: run.finished_on, reverse=True)
+
+
+def _indexed(path: Path) -> IndexedRun:
+    try:
+        return _read(RunFolder(path))
+    except (HarnessError, OSError, ValueError, KeyError) as error:
+        return IndexedRun(folder=path, name=path.name, state="unreadable", problem=str(error))
+
+
+def _read(folder: RunFolder) -> IndexedRun:
+    manifest = folder.manifest()
+    entries: Mapping[str, Mapping[str, Any]] = manifest["stages"]
+    done = [name for name, entry in entries.items() if entry["status"] in _FINISHED]
+    has_page = (folder.path / "report.html").is_file()
+    has_ended = len(done) == len(entries) and (folder.path / "summary.csv").is_file()
+    held = not has_ended and is_held(folder.lock)
+    begun = _log_of(folder.path / LOG) if held else []
+    naive, last = _worst(manifest, folder.path / "summary.csv") if has_ended else (None, None)
+    return IndexedRun(
+        folder=folder.path,
+        name=folder.path.name,
+        state="ended" if has_ended else "running" if held else "interrupted",
+        ego=ego_of(manifest),
+        scene=scene_of(manifest),
+        personas=manifest["personas"],
+        seeds=manifest["seeds"],
+        finished_on=finished_on(manifest),
+        version=manifest["versions"]["harness"],
+        quick=bool(manifest.get("quick")),
+        stages_done=len(done),
+        stages=len(entries),
+        running=[stage for stage, ended in _last_events(begun).items() if not ended],
+        left_s=_left_s(entries, begun) if held else None,
+        accepted=_accepted(folder.path / RESULT) if has_ended else None,
+        naive=naive,
+        last=last,
+        has_page=has_page,
+    )
+
+
+def _accepted(file: Path) -> bool | None:
+    if not file.is_file():
+        return None
+    accepted: bool | None = json.loads(file.read_bytes())["accepted"]
+    return accepted
+
+
+def _worst(manifest: Mapping[str, Any], summary: Path) -> tuple[WorstCell | None, WorstCell | None]:
+    """The worst cells of the naive ego, and of the others."""
+    cells: dict[str, list[int]] = {}
+    with summary.open(encoding="utf-8", newline="") as file:  # pandas takes ten times as long for a table so short
+        for row in csv.DictReader(file):
+            if row["failure_rate"]:
+                cell = cells.setdefault(row["arm"], [0, 0])
+                cell[0] += int(row["collisions"]) + int(row["rails"]) + int(row["timeouts"])
+                cell[1] += int(row["episodes"]) - int(row["errors"])
+    arms = {each.name: each.arm for each in planned(manifest) if isinstance(each, AssessmentStage)}
+    own = {name: arm for name, arm in arms.items() if arm.ego is not None and not arm.is_of_a_trait}
+    of_naive = {name for name, arm in own.items() if isinstance(arm.ego, NaiveEgo)}
+    found = [WorstCell(arm=name, failures=failed, games=games) for name, (failed, games) in cells.items() if games]
+    return _of_arms(found, of_naive), _of_arms(found, own.keys() - of_naive)
+
+
+def _of_arms(cells: Sequence[WorstCell], arms: set[str]) -> WorstCell | None:
+    return max((cell for cell in cells if cell.arm in arms), key=lambda cell: cell.failures / cell.games, default=None)
+
+
+# --- a run that is going on ----------------------------------------------------------------------------------------
+
+
+def _log_of(file: Path) -> list[re.Match[str]]:
+    """What the log says of stages, in order."""
+    if not file.is_file():
+        return []
+    lines = file.read_text(encoding="utf-8", errors="replace").splitlines()
+    return list(filter(None, map(_LINE.match, lines)))
+
+
+def _last_events(begun: Sequence[re.Match[str]]) -> dict[str, bool]:
+    """For each stage in the log whether it has ended."""
+    return {each["stage"]: each["what"] != "started" for each in begun}
+
+
+def _left_s(entries: Mapping[str, Mapping[str, Any]], begun: Sequence[re.Match[str]]) -> float | None:
+    """The time left: the mean duration of the done stages of each kind for each that is not done, at the pace at which
+    stages were carried out beside one another."""
+    spent: dict[str, list[float]] = {}
+    for entry in entries.values():
+        if entry["status"] in _FINISHED and entry.get("seconds"):
+            spent.setdefault(entry["kind"], []).append(entry["seconds"])
+    kinds = [entry["kind"] for entry in entries.values() if entry["status"] not in _FINISHED]
+    if not begun or any(kind not in spent for kind in kinds):
+        return None
+    elapsed_s = sum(_durations_s(begun))
+    total_s = sum(map(sum, spent.values()))
+    if not (elapsed_s and total_s):
+        return None
+    return sum(sum(spent[kind]) / len(spent[kind]) for kind in kinds) * elapsed_s / total_s
+
+
+def _durations_s(begun: Sequence[re.Match[str]]) -> Iterator[float]:
+    """The time in which at least one stage was carried out, between consecutive lines of the log."""
+    running: set[str] = set()
+    before: datetime | None = None
+    for each in begun:
+        now = datetime.strptime(each["time"], "%Y-%m-%dT%H:%M:%SZ")
+        if before is not None and running:
+            yield (now - before).total_seconds()
+        before = now
+        (running.add if each["what"] == "started" else running.discard)(each["stage"])

@@ -1,0 +1,152 @@
+"""The index of the runs in a folder, as a page and for the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+from urllib.parse import quote
+
+from harness.reports.numbers import MISSING, duration, percent
+from harness.reports.page_template import environment_of
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+State = Literal["ended", "running", "interrupted", "unreadable"]
+
+RELOAD_S = 10
+"""The page of a folder with a run that is going on is loaded again after this time."""
+HEADINGS = ("run", "state", "ego", "scene", "people", "seeds", "date", "naive ego at worst", "later egos at worst")
+
+
+@dataclass(frozen=True, kw_only=True)
+class WorstCell:
+    """The arm in which an ego of a run fails most often, over all training seeds."""
+
+    arm: str
+    failures: int
+    games: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class IndexedRun:
+    """One run of an index."""
+
+    folder: Path
+    name: str
+    state: State
+    problem: str = ""
+    """Why the run can't be read; empty where it can."""
+    ego: str = ""
+    scene: str = ""
+    personas: Sequence[str] = ()
+    seeds: Sequence[int] = ()
+    finished_on: str = ""
+    """Date of the last stage that ended; empty before the first."""
+    version: str = ""
+    """Of the harness."""
+    quick: bool = False
+    stages_done: int = 0
+    stages: int = 0
+    running: Sequence[str] = ()
+    """The stages that are being carried out."""
+    left_s: float | None = None
+    """An estimate of the time that the rest takes; None where it is not known."""
+    accepted: bool | None = None
+    """Whether every bound is kept; None without bounds or before the end."""
+    naive: WorstCell | None = None
+    last: WorstCell | None = None
+    """Of the egos that are not naive."""
+    has_page: bool = False
+
+    def matches(self, text: str) -> bool:
+        """Whether name, ego, scene or a persona contains a text, in any case."""
+        return any(text.casefold() in each.casefold() for each in (self.name, self.ego, self.scene, *self.personas))
+
+
+def render_index(folder: str, runs: Sequence[IndexedRun], search: str = "") -> str:
+    """The page as HTML. `runs` are all runs of the folder; those that contain `search` are shown."""
+    shown = [run for run in runs if run.matches(search)]
+    rows = [
+        {
+            "run": run,
+            "address": f"{quote(run.folder.name)}/" if run.has_page else "",
+            "state": _state(run),
+            "tone": _tone(run),
+            "cells": _cells(run),
+            "compare": [
+                (other.name, f"compare/{quote(other.folder.name)}/{quote(run.folder.name)}")
+                for other in earlier(run, runs)[:1]
+            ],
+        }
+        for run in shown
+    ]
+    environment = environment_of("reports")
+    return environment.get_template("index.html.jinja").render(
+        folder=folder,
+        rows=rows,
+        runs=len(runs),
+        search=search,
+        headings=HEADINGS,
+        reload_s=RELOAD_S if any(run.state == "running" for run in runs) else 0,
+    )
+
+
+def earlier(run: IndexedRun, runs: Sequence[IndexedRun]) -> list[IndexedRun]:
+    """The other runs of the same ego on the same scene that ended no later, the latest first; `runs` are sorted so."""
+    if run.state != "ended":
+        return []
+    same = [each for each in runs if (each.ego, each.scene, each.state) == (run.ego, run.scene, "ended")]
+    return same[same.index(run) + 1 :]
+
+
+def terminal_table(runs: Sequence[IndexedRun]) -> Table:
+    """The index for the terminal."""
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    for heading in HEADINGS:
+        table.add_column(heading, overflow="fold")
+    for run in runs:
+        table.add_row(run.name, _state(run), *_cells(run), style="red" if _tone(run) == "harm" else None)
+    return table
+
+
+def record_of(run: IndexedRun) -> dict[str, Any]:
+    """A run of the index as JSON has it."""
+    return asdict(run) | {"folder": str(run.folder)}
+
+
+def _cells(run: IndexedRun) -> list[str]:
+    seeds = ", ".join(map(str, run.seeds)) if len(run.seeds) <= 3 else f"{len(run.seeds)} seeds"
+    return [run.ego, run.scene, ", ".join(run.personas), seeds, run.finished_on, _worst(run.naive), _worst(run.last)]
+
+
+def _state(run: IndexedRun) -> str:
+    """What the run has come to, in words."""
+    match run.state:
+        case "unreadable":
+            return f"can't be read: {run.problem}"
+        case "interrupted":
+            return f"interrupted after {run.stages_done} of {run.stages} stages"
+        case "running":
+            left = "" if run.left_s is None else f", about {duration(run.left_s)} left"
+            stages = f": {', '.join(run.running)}" if run.running else ""
+            return f"running, {run.stages_done} of {run.stages} stages{left}{stages}"
+        case "ended":
+            result = {True: "PASS", False: "FAIL", None: "no bounds"}[run.accepted]
+            return f"{result} (quick)" if run.quick else result
+
+
+def _tone(run: IndexedRun) -> str:
+    if run.state in ("unreadable", "interrupted") or run.accepted is False:
+        return "harm"
+    return "mended" if run.accepted else "open"
+
+
+def _worst(cell: WorstCell | None) -> str:
+    if cell is None:
+        return MISSING
+    return f"{percent(cell.failures / cell.games)} ({cell.failures:,} of {cell.games:,}) in {cell.arm}"

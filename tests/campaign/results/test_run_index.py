@@ -1,0 +1,140 @@
+"""The index of runs: `harness runs`, and `harness serve` of a folder of run folders."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import time
+import urllib.error
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from harness.campaign.results.run_index import runs_in
+from harness.campaign.results.served_runs import ServedRuns
+from harness.campaign.storage.locks import only_one
+from harness.campaign.storage.run_folder import RunFolder
+from harness.errors import UsageError
+from harness.reports.index_page import render_index
+from tests.support.repository import REPOSITORY
+from tests.support.serving import read, serving
+from tests.support.tiny import harness, sumo_run
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with a run that has ended, one that was interrupted, one that is damaged, and something else."""
+    shutil.copytree(sumo_run(), tmp_path / "first")
+    half = shutil.copytree(sumo_run(), tmp_path / "half")
+    (half / "summary.csv").unlink()
+    manifest = json.loads((half / "manifest.json").read_bytes())
+    stage = next(name for name, entry in manifest["stages"].items() if entry["kind"] == "assessment")
+    manifest["stages"][stage]["status"] = "pending"
+    RunFolder(half).write_manifest(manifest)
+    (tmp_path / "damaged").mkdir()
+    (tmp_path / "damaged" / "manifest.json").write_text("{")
+    (tmp_path / "else").mkdir()
+    return tmp_path
+
+
+def test_index__says_how_far_each_run_is_and_where_its_ego_fails_most(folder: Path) -> None:
+    runs = {run.name: run for run in runs_in(folder)}
+    assert {name: run.state for name, run in runs.items()} == {
+        "first": "ended",
+        "half": "interrupted",
+        "damaged": "unreadable",
+    }
+    first = runs["first"]
+    assert (first.ego, first.scene, first.stages_done) == ("sumo", "paper_merge", first.stages)
+    assert first.naive is not None
+    assert first.naive.games == 2  # of one arm and seed
+    assert first.last is None  # an ego that SUMO drives is not retrained
+    assert runs["half"].stages_done == runs["half"].stages - 1
+    assert "is damaged" in runs["damaged"].problem
+    with pytest.raises(UsageError, match="is not a folder"):
+        runs_in(folder / "nowhere")
+
+
+def test_index__a_run_that_a_command_holds_is_running_with_its_stage_and_the_time_left(folder: Path) -> None:
+    half = folder / "half"
+    manifest = json.loads((half / "manifest.json").read_bytes())
+    stages = manifest["stages"]
+    pending = next(name for name, entry in stages.items() if entry["status"] == "pending")
+    for entry in stages.values():
+        if entry["status"] == "done":
+            entry["seconds"] = 10.0
+    RunFolder(half).write_manifest(manifest)
+    other = next(name for name, entry in stages.items() if entry["kind"] == "assessment" and name != pending)
+    # one stage after the other, each 10 s: the one that is left takes 10 s
+    done = [name for name in stages if name != pending]
+    lines = [
+        f"2026-11-25T20:{10 * place // 60:02d}:{10 * place % 60:02d}Z INFO    {what} {name}"
+        for start, name in enumerate(done)
+        for place, what in ((start, "started "), (start + 1, "done    "))
+    ]
+    assert other in done
+    end = len(done)
+    lines.append(f"2026-11-25T20:{10 * end // 60:02d}:{10 * end % 60:02d}Z INFO    started  {pending}")
+    (half / "harness.log").write_text("\n".join(lines) + "\n")
+    with only_one(RunFolder(half).lock):
+        run = next(each for each in runs_in(folder) if each.name == "half")
+    assert (run.state, list(run.running)) == ("running", [pending])
+    assert run.left_s == pytest.approx(10.0)
+
+
+def test_runs__lists_them_and_finds_them_by_a_text(folder: Path) -> None:
+    listed = json.loads(of_runs(folder, "--json"))
+    assert {each["name"] for each in listed} == {"first", "half", "damaged"}
+    found = json.loads(of_runs(folder, "--search", "FIRST", "--json"))
+    assert [each["name"] for each in found] == ["first"]
+    assert "there is no run that contains 'x'" in of_runs(folder, "--search", "x")
+
+
+def of_runs(folder: Path, *options: str) -> str:
+    done = harness("runs", folder, *options)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.fixture
+def address(folder: Path) -> Iterator[str]:
+    shutil.copytree(folder / "first", folder / "second")
+    with serving(ServedRuns(folder).answer) as server:
+        yield f"http://127.0.0.1:{server.server_port}"
+
+
+def test_serve__of_a_folder_has_an_index_every_report_with_its_games_and_comparisons(address: str) -> None:
+    index = read(f"{address}/")
+    assert 'href="/first/"' in index
+    assert "interrupted after" in index
+    assert 'href="/compare/second/first"' in index  # of the same date, by name
+    report = read(f"{address}/first/")
+    assert "connect-src 'self'" in report
+    arm, _, seed, episode, *_ = json.loads(report.split('id="elsewhere">')[1].split("</script>")[0])[0]
+    assert json.loads(read(f"{address}/first/games/{arm},{seed},{episode}.json"))["arm"] == arm
+    assert "no difference" in read(f"{address}/compare/second/first")
+    assert 'href="/second/"' not in read(f"{address}/?search=first")
+
+
+@pytest.mark.parametrize(
+    "path", ["/x/", "/..%2f..%2fetc/", "/compare/first", "/compare/first/..", "/first/manifest.json"]
+)
+def test_serve__of_a_folder_nothing_else_is_there(path: str, address: str) -> None:
+    with pytest.raises(urllib.error.HTTPError) as refused:
+        read(f"{address}{path}")
+    assert refused.value.code == 404
+
+
+def test_index__of_200_runs_takes_a_second_of_processor_time(tmp_path: Path) -> None:
+    for number in range(200):
+        run = tmp_path / f"run{number}"
+        run.mkdir()
+        for name in ("manifest.json", "summary.csv", "result.json"):
+            shutil.copy(REPOSITORY / "reports" / "merge" / name, run / name)
+    begun = time.process_time()
+    page = render_index("reports", runs_in(tmp_path))
+    assert time.process_time() - begun < 2.0  # twice as long where other programs share the processor's cores
+    assert "200 of 200 runs" in page
