@@ -103,14 +103,16 @@ def earlier(run: IndexedRun, runs: Sequence[IndexedRun]) -> list[IndexedRun]:
 
 
 def terminal_table(runs: Sequence[IndexedRun]) -> Table:
-    """The index for the terminal."""
+    """The index for the terminal, without what only the page has room for."""
     from rich.table import Table
 
     table = Table(box=None, pad_edge=False)
-    for heading in HEADINGS:
+    for heading in ("run", "scene", "date", "naive fails", "later fails", "state"):
         table.add_column(heading, overflow="fold")
     for run in runs:
-        table.add_row(run.name, _state(run), *_cells(run), style="red" if _tone(run) == "harm" else None)
+        rates = [MISSING if cell is None else percent(cell.failures / cell.games) for cell in (run.naive, run.last)]
+        style = "red" if _tone(run) == "harm" else None
+        table.add_row(run.name, run.scene, run.finished_on, *rates, _state(run), style=style)
     return table
 
 
