@@ -10,6 +10,7 @@ HarnessError                 any error that the harness raises
 
 from __future__ import annotations
 
+import difflib
 import math
 import sys
 from collections.abc import Callable, Iterable
@@ -163,3 +164,14 @@ def collect(problems: list[Problem], action: Callable[[], T]) -> T | None:
     except UsageError as error:
         problems.extend(error.problems)
         return None
+
+
+ALIKE = 0.7
+"""The likeness of two names (`difflib.SequenceMatcher.ratio`) from which one is a misspelling of the other."""
+_COMPARED_CHARACTERS = 200
+
+
+def name_like(word: str, names: Iterable[str]) -> str | None:
+    """The name that a word is a misspelling of; None if it is like none of them."""
+    close = difflib.get_close_matches(word[:_COMPARED_CHARACTERS], sorted(names), n=1, cutoff=ALIKE)
+    return close[0] if close else None

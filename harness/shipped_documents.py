@@ -5,13 +5,12 @@ An installed package has them in `harness/shipped/`, a checkout at its top.
 
 from __future__ import annotations
 
-import difflib
 import os
 import re
 from pathlib import Path
 from typing import Literal
 
-from harness.errors import UsageError
+from harness.errors import UsageError, name_like
 
 Kind = Literal["networks", "personas", "egos", "policies", "campaigns"]
 """The folders of documents."""
@@ -94,6 +93,6 @@ def document_at(path: Path, kind: Kind) -> Path:
 def missing_document(written: str, folder: Path, kind: Kind) -> tuple[str, str]:
     """Message and remedy for a name of which there is no document."""
     names = {each.stem for place in (folder, folder / kind) if place.is_dir() for each in place.iterdir()}
-    close = difflib.get_close_matches(written[:200], sorted(names | set(shipped_names(kind))), n=1, cutoff=0.5)
-    shown = f"did you mean {close[0]!r}?" if close else f"shipped are {', '.join(shipped_names(kind))};"
+    close = name_like(written, names | set(shipped_names(kind)))
+    shown = f"did you mean {close!r}?" if close else f"shipped are {', '.join(shipped_names(kind))};"
     return f"there is no {_ONE_OF[kind]} {written!r}", f"{shown} a path is relative to {folder.absolute()}"

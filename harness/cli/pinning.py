@@ -78,6 +78,10 @@ def minimise(
         with console.status(f"minimising {escape(failure.arm)}, game {failure.episode}"):
             pinned = pinning.pin(failure)
         print_plain(_found(pinned), console)
+    if chosen:
+        print_plain(
+            [f"To play them against another ego: harness regression {out or run / 'pinned'} --ego DRIVER"], console
+        )
 
 
 def regression(

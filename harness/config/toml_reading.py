@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 import re
 import sys
@@ -15,7 +14,7 @@ import tomli_w
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 from typing_extensions import Self
 
-from harness.errors import Problem, UsageError, plain
+from harness.errors import Problem, UsageError, name_like, plain
 from harness.files import content_of
 
 if sys.version_info >= (3, 11):
@@ -71,7 +70,7 @@ class Mistakes(ValueError):
 
 
 _MOST_BYTES, _MOST_MISTAKES = 1_000_000, 100
-_NAMES_SHOWN, _COMPARED_CHARACTERS = 40, 200
+_NAMES_SHOWN = 40
 _QUOTED = re.compile(r""""[^"\n]*"|'[^'\n]*'""")
 _ENDLESS_KEY = re.compile(r"(?<![\w.-])(?:[\w-]+[ \t]*\.[ \t]*){50}")
 NUMBER, TABLE = "<number>", "<table>"  # tags of a union's members; not part of any key
@@ -119,9 +118,8 @@ def read_document(path: str | Path, model: type[D]) -> D:
 def nearest(word: str, words: Iterable[str]) -> str:
     """A remedy: the valid word nearest to a misspelt one, else the valid words (the first 40)."""
     words = sorted(words)
-    close = difflib.get_close_matches(word[:_COMPARED_CHARACTERS], words, n=1, cutoff=0.5)
-    if close:
-        return f"did you mean {close[0]!r}?"
+    if close := name_like(word, words):
+        return f"did you mean {close!r}?"
     more = f" and {len(words) - _NAMES_SHOWN} more" if len(words) > _NAMES_SHOWN else ""
     return f"valid: {', '.join(words[:_NAMES_SHOWN])}{more}"
 

@@ -10,7 +10,6 @@ An FMU is native code. If it crashes or hangs, one game fails and the campaign c
 
 from __future__ import annotations
 
-import difflib
 import json
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,7 +21,7 @@ from harness.config.toml_reading import nearest
 from harness.drivers.car import Car
 from harness.drivers.fmu_variables import ENTRY_TYPES, REALS, Value, value_for
 from harness.drivers.process import ProcessDriver
-from harness.errors import Problem, UsageError
+from harness.errors import Problem, UsageError, name_like
 from harness.game.observation_layout import LAYOUT
 from harness.shipped_documents import PACKAGE
 
@@ -33,8 +32,6 @@ _NEEDED = {
     "output": (("Real", "Float64"), "a single Real (FMI 2.0) or Float64 is needed"),
 }
 """The types of inputs and outputs, and the remedy for another type."""
-_ALIKE = 0.8
-"""Likeness of two names from which one is taken for a misspelling of the other, as difflib measures it."""
 _MOST_SHOWN = 10  # problems, or names in a note
 _UNITS = {"mps": {"m": 1, "s": -1}, "mps2": {"m": 1, "s": -2}, "m": {"m": 1}, "rad": {"rad": 1}}
 _SI = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
@@ -159,9 +156,9 @@ def _mistakes_of_start(
 ) -> Iterator[tuple[str, str, str]]:
     """Key, message and remedy of each value under [start] that is wrong, and of each input that needs one."""
     for name in without_entry:
-        likely = difflib.get_close_matches(name, ENTRY_OF, n=1, cutoff=_ALIKE)
+        likely = name_like(name, ENTRY_OF)
         if name not in document.start and (variables[name].start is None or likely):
-            told = f"; did you mean {likely[0]!r}?" if likely else ""
+            told = f"; did you mean {likely!r}?" if likely else ""
             remedy = f"connect it under [inputs], or give it a value under [start]{told}"
             yield name, "this input of the FMU has no entry of the observation and no value", remedy
     settable = {name: each for name, each in variables.items() if each.causality in ("parameter", "input")}

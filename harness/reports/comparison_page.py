@@ -121,4 +121,4 @@ def _with_interval(found: Difference, side: Side) -> str:
 
 
 def _with_unit(found: Difference, value: float) -> str:
-    return f"{signed(value * 100.0, 1)} points" if found.is_rate else f"{signed(value, 3)}{NO_SPACE}m/s"
+    return f"{signed(value * 100.0, 1)} points" if found.is_rate else f"{number(value, 3)}{NO_SPACE}m/s"

@@ -24,7 +24,7 @@ from harness.reports.learning import learning, searches, stopped
 from harness.reports.manoeuvres import failures_by_cause, marks_of
 from harness.reports.next_steps import next_steps
 from harness.reports.page_template import CONTENT_POLICY, ELSEWHERE, LIBRARIES, SCRIPTS, environment_of, sources
-from harness.reports.provenance import asked_alone, command_of, facts, made_by, mixed_versions
+from harness.reports.provenance import QUICK, asked_alone, command_of, facts, made_by, mixed_versions
 from harness.reports.run_tables import RunTables, unplayed
 from harness.reports.scope_wording import planned_in_words
 
@@ -32,7 +32,6 @@ MOST_ROWS = 10_000
 """The page leaves out a longer table of games and refers to its CSV file."""
 GAMES_BYTES = 600_000
 """Room for recorded games. `harness serve` shows all."""
-QUICK = "Quick run: fewer training steps than table 1; not for conclusions."
 CAPTIONS = {
     "comparisons": "Every test of a trained pair.",
     "over_trainings": "Every test over trainings.",

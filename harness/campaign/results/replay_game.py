@@ -70,7 +70,7 @@ def game_table(run: Path, chosen: GameList) -> Table:
     table = Table(
         title=Text(f"Games of {run}, worst first"),
         title_justify="left",
-        caption=Text(f"{left}to watch one: harness replay RUN ARM EPISODE"),
+        caption=Text(f"{left}severity orders the games: docs/columns.md; to watch one: harness replay RUN ARM EPISODE"),
         box=SIMPLE,
         padding=0,
     )

@@ -15,6 +15,7 @@ from harness.reports.acceptance_wording import acceptance_lines
 from harness.reports.game import gap_verdicts
 from harness.reports.key_figures import harm_of
 from harness.reports.next_steps import to_learn
+from harness.reports.provenance import QUICK
 from harness.reports.run_tables import QUESTIONS, RunTables
 from harness.reports.verdict_wording import Answer, answer, as_sentence
 
@@ -51,6 +52,8 @@ def shown_result(campaign: Campaign, tables: RunTables, verdicts: Verdicts) -> R
 
 
 def _lines(campaign: Campaign, tables: RunTables, verdicts: Verdicts) -> Iterator[ShownLine]:
+    if tables.manifest.get("quick"):
+        yield ShownLine(text=QUICK, style="bold yellow")
     for name, shortfall in did_not_learn(tables.stages).items():
         yield ShownLine(text=f"Did not learn: {name}: {shortfall}", style="bold yellow", is_failure=True)
     for persona, verdict, causes in verdicts:
