@@ -125,7 +125,8 @@ def test_serve__of_a_folder_has_an_index_every_report_with_its_games_and_compari
 def test_serve__of_a_folder_nothing_else_is_there(path: str, address: str) -> None:
     with pytest.raises(urllib.error.HTTPError) as refused:
         read(f"{address}{path}")
-    assert refused.value.code == 404
+    with refused.value:
+        assert refused.value.code == 404
 
 
 def test_index__of_200_runs_takes_a_second_of_processor_time(tmp_path: Path) -> None:
