@@ -19,6 +19,7 @@ from harness.reports.arm_figures import (
     spread_figure,
 )
 from harness.reports.differences import statistics
+from harness.reports.failing_paths import SPAN_S, FailingPath, paths_figures
 from harness.reports.game_links import GameLinks
 from harness.reports.human_ranges import crashes_alone
 from harness.reports.key_figures import card_verdict, egos_of, key_figures, portrait
@@ -38,19 +39,31 @@ STILL_DRIVES = "The {made} ego alone: does it still drive without failures?"
 SPREADS = "Average speed, trailing distance, least time to collision and hardest braking of the ego in each game"
 
 
-def card(persona: str, place: int, tables: RunTables, links: GameLinks) -> dict[str, Any]:
-    """What the templates show of a persona; `place` makes the ids of its figures unique."""
+def card(
+    persona: str,
+    place: int,
+    tables: RunTables,
+    links: GameLinks,
+    scene: Mapping[str, Any] | None = None,
+    paths: Sequence[FailingPath] = (),
+) -> dict[str, Any]:
+    """What the templates show of a persona; `place` makes the ids of its figures unique. `paths` are those of the games
+    that an ego fails, on the road `scene`."""
     is_changed, figures = bool(tables.asked("RQ2", persona)), key_figures(persona, tables)
     columns = _columns(persona, is_changed, tables, links)
     tests = [row for row in tables.comparisons.to_dict("records") if row["persona"] == persona]
     labels = {columns[0].arm: f"{tables.naive}, alone", columns[2].arm: f"{tables.naive}, against {persona}"}
     labels |= {each.arm: f"{tables.change.made} ego, against {persona}" for each in columns[3:]}
+    failed = {arm: sum(map(failures, tables.rates_of(arm).values())) for arm in labels}
+    of_egos = [path for path in paths if path.persona == persona]
     paired, paired_note = _paired(persona, place, columns[2], columns[3], tables) if is_changed else (None, "")
     return {
         "persona": persona,
         "anchor": f"persona-{place}",
         "portrait": portrait(tables.manifest.get("persona_documents", {}).get(persona, {})),
         "worst": links.worst_of({arm: label for arm, label in labels.items() if arm != NAIVE_ALONE.name}),
+        "paths_span_s": SPAN_S,
+        "paths": list(paths_figures(of_egos, scene, labels, failed, f"paths{place}")) if scene else [],
         "verdicts": [
             card_verdict(
                 question.format(person=tables.person, doing=tables.change.doing), answer(tables, name, persona), figures

@@ -19,8 +19,9 @@ if TYPE_CHECKING:
 
 INK, GRID = "#010101", "#010102"
 SERIES = {"alone": "#010111", "sumo": "#010112", "persona": "#010113", "retrained": "#010114"}
+ROAD = {"asphalt": "#010121", "rail": "#010122", "ego": "#010123", "non-ego": "#010124", "contact": "#010125"}
 _PAGE_COLOURS = {INK: "currentColor", GRID: "var(--grid)"} | {
-    stand_in: f"var(--{name})" for name, stand_in in SERIES.items()
+    stand_in: f"var(--{name})" for name, stand_in in (SERIES | ROAD).items()
 }
 _STYLE = {
     "svg.fonttype": "none",

@@ -15,6 +15,8 @@ from harness.reports.provenance import command_of
 from harness.reports.run_tables import RunTables
 
 MOST_STEPS = 4
+_BREAKING = {"near_miss_rate": "near_miss", "harm_to_others_rate": "harm_to_others"}
+"""The column of episodes.csv that marks the games which a bound on something else than failures is about."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,7 +63,11 @@ def _watch(tables: RunTables) -> Iterator[NextStep]:
     focus = focus_of(tables)
     if focus is None:
         return
-    game = worst_first(tables.games_of(focus.arm)).iloc[0].to_dict()
+    games = tables.games_of(focus.arm)
+    if focus.check is not None and (breaking := _BREAKING.get(focus.check.bound)):
+        marked = games[games[breaking].fillna(0) == 1]
+        games = marked if len(marked) else games
+    game = worst_first(games).iloc[0].to_dict()
     command = replay_command(game, tables.several_seeds)
     watched = key(focus.arm, game["seed"], game["episode"])
     yield NextStep(sentence=f"See how {focus.happens}: the worst game.", command=command, game=watched)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from harness.evaluation.competence import DID_NOT_LEARN
@@ -16,6 +16,7 @@ from harness.reports.cards import CAUTION, card
 from harness.reports.data_table import table
 from harness.reports.differences import METRIC_WORDS, effect
 from harness.reports.embedding import GameTracks, embedded_games, recorded_document
+from harness.reports.failing_paths import FailingPath
 from harness.reports.failure_table import failure_table
 from harness.reports.first_answers import first_answers
 from harness.reports.game import game_section
@@ -45,11 +46,16 @@ REPLAYS_SHOWN = 12
 """`harness replay RUN --list` lists all."""
 
 
-def render_page(tables: RunTables, games: Iterable[GameTracks] = (), scene: Mapping[str, Any] | None = None) -> str:
+def render_page(
+    tables: RunTables,
+    games: Iterable[GameTracks] = (),
+    scene: Mapping[str, Any] | None = None,
+    paths: Sequence[FailingPath] = (),
+) -> str:
     """The report as HTML. Equal input gives equal text.
 
-    `games`, those to watch first at the front, are embedded as far as they fit (`GAMES_BYTES`); without a `scene`, the
-    road as `road.js` reads it, none is.
+    `games`, those to watch first at the front, are embedded as far as they fit (`GAMES_BYTES`); `paths` are drawn over
+    one another. Without a `scene`, the road as `road.js` reads it, there are neither.
     """
     texts = embedded_games(games if scene is not None else (), marks_of(tables.manoeuvres), tables.crowds, GAMES_BYTES)
     links = GameLinks(embedded=texts, episodes=tables.episodes)
@@ -64,7 +70,7 @@ def render_page(tables: RunTables, games: Iterable[GameTracks] = (), scene: Mapp
         answers=first_answers(tables, steps),
         attribution=attribution_section(tables, links),
         next_steps=steps,
-        cards=[card(persona, place, tables, links) for place, persona in enumerate(tables.personas, 1)],
+        cards=[card(persona, place, tables, links, scene, paths) for place, persona in enumerate(tables.personas, 1)],
         most_dots=MOST_DOTS if tables.episodes.groupby("arm").size().max() > MOST_DOTS else 0,
         caution=CAUTION,
         metrics={metric: words.name for metric, words in METRIC_WORDS.items()},

@@ -21,6 +21,7 @@ from harness.replay import choose_games
 from harness.replay.contacts import contacts
 from harness.replay.vehicles import DrawnVehicle, presences, types_of_vehicles
 from harness.reports.embedding import BACKGROUND_COLUMNS, COLUMNS, GameTracks, Track
+from harness.reports.failing_paths import MOST_PATHS, SPAN_S, FailingPath
 from harness.road.net.network import read_net
 from harness.road.scene import drawing
 from harness.road.scene.open_scene import OpenScene
@@ -47,6 +48,33 @@ def recorded_games(
         trace = reader.read(traces(game.arm, game.seed), game.episode)
         if not trace.empty:
             yield tracks_of(trace, scene, game)
+
+
+def failing_paths(
+    episodes: pd.DataFrame, arms: Mapping[str, Arm], traces: Callable[[str, int], Path], scene: OpenScene
+) -> Iterator[FailingPath]:
+    """The last seconds of the games that an ego fails against a person, at most `MOST_PATHS` of an arm, worst first."""
+    against = [name for name, arm in arms.items() if arm.ego and arm.non_ego and not arm.is_of_a_trait]
+    failed = episodes[episodes["arm"].isin(against) & (episodes["ego_failed"] == 1) & (episodes["error"] == "")]
+    reader = TraceReader()
+    for game in worst_first(failed).groupby("arm", sort=False).head(MOST_PATHS).itertuples():
+        trace = reader.read(traces(game.arm, game.seed), game.episode)
+        if not trace.empty:
+            yield path_of(trace, scene, game)
+
+
+def path_of(trace: pd.DataFrame, scene: OpenScene, game: Any) -> FailingPath:
+    """The last seconds of one game, until the ego ends; `game` is its row of `episodes`."""
+    last = int(trace.loc[trace["player"] == "ego", "step"].max())
+    shown = trace[trace["step"].between(last - round(SPAN_S / scene.world.step_s), last)].sort_values("step")
+    players = {str(role): rows for role, rows in shown.groupby("player") if role in scene.world.roles}
+    touches = contacts(trace, types_of_vehicles(trace, scene.route_files, scene.obstacles), scene.rail_lines)
+    return FailingPath(
+        arm=game.arm,
+        persona=game.persona,
+        players={role: rows[["x_m", "y_m"]].to_numpy(float) for role, rows in players.items()},
+        contact_m=(touches[-1].x_m, touches[-1].y_m) if touches else None,
+    )
 
 
 def watching_order(

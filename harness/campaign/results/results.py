@@ -13,7 +13,7 @@ from harness.campaign.results.evaluate_run import csv_tables, evaluated
 from harness.campaign.results.kept_results import RunResult, keep_result
 from harness.campaign.results.model_cards import write_model_cards
 from harness.campaign.results.read_run import read_run
-from harness.campaign.results.recorded_games import recorded_games, scene_drawing
+from harness.campaign.results.recorded_games import failing_paths, recorded_games, scene_drawing
 from harness.campaign.results.replay_game import read_game
 from harness.campaign.results.shown_result import shown_result, verdicts_of
 from harness.campaign.results.shown_work import doing, progress_bar, say
@@ -44,7 +44,8 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
         games = recorded_games(
             tables.episodes, tables.arms, folder.traces_of_arm, run.scene, examples(tables.attribution)
         )
-        page = render_page(tables, games, scene_drawing(run.scene))
+        paths = list(failing_paths(tables.episodes, tables.arms, folder.traces_of_arm, run.scene))
+        page = render_page(tables, games, scene_drawing(run.scene), paths)
     write_atomically(folder.path / "report.html", page.encode())
     verdicts = verdicts_of(run.campaign, tables)
     result = shown_result(run.campaign, tables, verdicts)

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from harness.campaign.results.recorded_games import TAKE_TURNS, scene_drawing, tracks_of, watching_order
+from harness.campaign.results.recorded_games import TAKE_TURNS, path_of, scene_drawing, tracks_of, watching_order
 from harness.evaluation.strategies import (
     Arm,
     Borrowed,
@@ -115,6 +115,17 @@ def test_game__a_background_vehicle_that_is_absent_for_a_while_is_in_pieces(merg
     tracks = tracks_of(trace(merge.world, ego=(range(6), -1.6, {}), van=([1, 2, 4, 5], -4.8, {})), merge, row)
     pieces = [(each.name, each.first_step, len(each.columns["x_m"])) for each in tracks.background]
     assert pieces == [("van", 1, 2), ("van", 4, 2)]
+
+
+def test_path__is_the_last_three_seconds_of_the_ego_and_the_people_with_the_contact(merge, row):
+    ends = {39: "rail"}
+    rows = trace(merge.world, ego=(range(40), -0.9, ends), non_ego=(range(35), -4.8, {}), van=(range(40), -4.8, {}))
+    path = path_of(rows, merge, row)
+    assert (path.arm, path.persona) == ("naive_vs_speedy", "")
+    assert path.players["ego"][:, 0].tolist() == [20.0 + step for step in range(9, 40)]
+    assert path.players["non_ego"][:, 0].tolist() == [20.0 + step for step in range(9, 35)]
+    assert set(path.players) == {"ego", "non_ego"}  # the van is no player
+    assert path.contact_m[1] == pytest.approx(0.0, abs=0.01)  # the left edge of the road
 
 
 def test_drawing__of_the_merge(merge):
