@@ -1,5 +1,5 @@
-"""The pictures of the documents: the shipped scenes, as `harness scene show --html` shows them in a browser, and the first
-screen of the published report.
+"""The pictures of the documents: the shipped scenes, as `harness scene show --html` shows them in a browser, and the
+first screen of the published report.
 
     python docs/publish/pictures.py [NAME...]
 

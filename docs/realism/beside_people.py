@@ -1,6 +1,7 @@
 """The tables of docs/realism.md: the players of runs beside published figures of people.
 
-    python docs/realism/beside_people.py reports/demo [RUN ...]
+    python docs/realism/beside_people.py players reports/demo [RUN ...]
+    python docs/realism/beside_people.py outside reports/demo [RUN ...]
 
 reads `realism.csv` of each run folder.
 """
@@ -17,6 +18,7 @@ from harness.evaluation.realism import (
     CRASH_ODDS,
     CRASH_SOURCE,
     CRASHES,
+    INSIDE,
     ODDS_SOURCE,
     OF_DRIVERS,
     OF_RIDERS,
@@ -42,6 +44,18 @@ def players(runs: Annotated[list[Path], typer.Argument(metavar="RUN ...")]) -> N
             value = f"{row.value} ({row.spread})"
             _print_row(row.player, row.figure, str(row.games), value, row.people, row.realistic)
         print()
+
+
+@app.command()
+def outside(runs: Annotated[list[Path], typer.Argument(metavar="RUN ...")]) -> None:
+    """How many figures of each run can be compared, and those that are not inside the range of people."""
+    _print_row("run", "figures compared", "inside", "not inside")
+    _print_row(*["---"] * 4)
+    for run in runs:
+        rows = human_rows(read_csv(run / "realism.csv"))
+        others = [row for row in rows if row.realistic != INSIDE]
+        told = [f"{row.player}: {row.figure} {row.value}, people {row.people} ({row.realistic})" for row in others]
+        _print_row(f"`{run.name}`", str(len(rows)), str(len(rows) - len(others)), "; ".join(told))
 
 
 @app.command()
