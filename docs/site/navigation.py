@@ -20,6 +20,9 @@ SECTIONS = {
         "egos-by-networks",
         "personas",
         "scenes",
+        "junctions",
+        "people-on-foot",
+        "route-files",
         "maps",
         "environments",
         "report",
@@ -38,7 +41,7 @@ SECTIONS = {
         "testing",
         "reliability",
     ),
-    "Results": ("reproduction", "realism", "performance"),
+    "Results": ("results", "reproduction", "realism", "performance"),
     "Reference": (
         "reference/cli",
         "reference/api",

@@ -10,7 +10,6 @@ import pytest
 from tests.support.repository import REPOSITORY
 from tests.support.scripts import script
 
-FOLDER = REPOSITORY / "docs" / "game"
 PUBLISHED = REPOSITORY / "reports" / "merge-arms-race"
 
 figures = script("game/figures.py")
@@ -30,7 +29,6 @@ def test_failures__a_cell_is_the_mean_over_seeds_and_a_dash_without_games() -> N
 @pytest.mark.parametrize(
     ("table", "source", "name"),
     [
-        ("gaps_table", FOLDER / "gaps-of-five-seeds.csv", "gaps"),
         ("gaps_table", PUBLISHED / "gaps.csv", "gaps"),
         ("failures_table", PUBLISHED / "crossplay.csv", "crossplay"),
         ("generalisation_table", PUBLISHED / "generalisation.csv", "generalisation"),
