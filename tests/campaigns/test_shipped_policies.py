@@ -88,10 +88,10 @@ def test_ten_seeds__are_the_papers_campaign_ten_times(repository: Path) -> None:
     assert (ten.scene.folder, ten.personas) == (one.scene.folder, one.personas)
 
 
-def test_merge_seeds__are_the_merge_five_times() -> None:
-    five, one = (open_campaign(CAMPAIGNS / f"{name}.toml").document for name in ("merge-seeds", "merge"))
-    assert five.model_copy(update={"name": one.name, "seeds": one.seeds, "best_response": None}) == one
-    assert five.seeds == [21, 22, 23, 24, 25]
+def test_merge_seeds__are_the_merge_ten_times() -> None:
+    ten, one = (open_campaign(CAMPAIGNS / f"{name}.toml").document for name in ("merge-seeds", "merge"))
+    assert ten.model_copy(update={"name": one.name, "seeds": one.seeds, "best_response": None}) == one
+    assert ten.seeds == list(range(21, 31))
 
 
 def test_shipped_policies__each_has_its_model_card_and_was_trained_on_the_scene() -> None:
