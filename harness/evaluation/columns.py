@@ -250,25 +250,17 @@ _TABLES = {
         *_STRATEGIES,
         *_PAIRS,
         Column("payoff", NUMBER, "Mean payoff of the player of that role, over the pairs."),
-        Column("payoff_best_response", NUMBER, "That of the best known response."),
-        Column("gap", NUMBER, "Mean of best known response minus player; below 0: nothing better is known."),
+        Column("payoff_best_response", NUMBER, "That of its best response."),
+        Column("gap", NUMBER, "Mean of best response minus player; below 0: the training found nothing better."),
         Column("ci_low", NUMBER, f"The low end of its {_T}.", label="its 95 % low"),
         Column("ci_high", NUMBER, f"The high end of its {_T}.", label="its 95 % high"),
         Column("gap_share", NUMBER, "gap / |payoff|; empty where the payoff is 0.", unit=SHARE),
         *(_P, _P_HOLM),
         *rate("ego_failure_rate", "Of the ego in the pair."),
-        *rate("ego_failure_rate_best_response", "The same with the best known response in its place."),
+        *rate("ego_failure_rate_best_response", "The same with the best response in its place."),
         *Column(
-            "failure_difference",
-            NUMBER,
-            "Mean of ego failures with the best known response minus without it.",
-            unit=POINTS,
+            "failure_difference", NUMBER, "Mean of ego failures with the best response minus without.", unit=POINTS
         ).with_interval(_T),
-        Column("search_steps", COUNT, "Budget of each training of the search for a best response."),
-        Column("search_starts", COUNT, "Trainings of the search."),
-        *Column("search_gap", NUMBER, "Mean of the search's best response minus player.").with_interval(_T),
-        Column("known", COUNT, "Other strategies of the campaign that are compared beside the search."),
-        Column("best_known", TEXT, "Arms of those that are the best known response; empty: it is the search's."),
         *(_VERDICT, _REASON),
     ),
     "crossplay": (
@@ -298,9 +290,6 @@ _TABLES = {
         ),
         Column(
             "solution_failure_rate", NUMBER, "Of the ego in this solution; safest: the mixture's worst.", unit=SHARE
-        ),
-        Column(
-            "held_out_failure_rate", NUMBER, "The same in games that did not choose the shares; number 1.", unit=SHARE
         ),
         Column(
             "dominated_in_payoff", TEXT, "The strategy or mixture of its role that strictly dominates it; empty: none."

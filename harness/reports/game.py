@@ -149,41 +149,21 @@ def _side(player: str, row: Row | None) -> str:
         return f"no best response of {player} was trained"
     match GapVerdict(row["verdict"]):
         case GapVerdict.DISTINGUISHABLE:
-            return f"{player} could still gain {_share(row)} of its payoff{_by(row)}"
+            return f"{player} could still gain {_share(row)} of its payoff"
         case GapVerdict.BEFORE_HOLM_ONLY:
             holm = f"but not after Holm's correction ({p_text(row['p_holm'])})"
-            return f"{player} might gain {_share(row)} of its payoff{_by(row)}, {holm}"
+            return f"{player} might gain {_share(row)} of its payoff, {holm}"
         case GapVerdict.NOT_DISTINGUISHABLE:
-            measured = f"{_search(row)} found a gain of {_share(row)} for {player}"
-            return f"{measured}{_by(row)}, which is not distinguishable from 0{_span(row)}"
+            measured = f"for {player} a gain of {_share(row)} was measured"
+            return f"{measured}, which is not distinguishable from 0{_span(row)}"
         case GapVerdict.NONE_FOUND:
-            return f"{_search(row)} found nothing better for {player}{_nor(row)}"
-        case GapVerdict.LACKS_POWER:
-            below = percent(-row["search_gap"] / abs(row["payoff"])) if row["payoff"] else number(-row["search_gap"], 2)
-            return f"the search for {player} lacks power: {_search(row)} end {below} below its own strategy"
+            return f"for {player} nothing better was found"
         case GapVerdict.NO_DIFFERENCE:
             return f"the best response of {player} earns the same in every game"
         case GapVerdict.ALL_EQUAL:
-            return f"{player} gains {_share(row)} of its payoff{_by(row)}, the same in every game: there is no test"
+            return f"{player} gains {_share(row)} of its payoff, the same in every game: there is no test"
         case _:
             return f"for {player} too few games could be compared"
-
-
-def _search(row: Row) -> str:
-    starts = row["search_starts"]
-    return f"{row['search_steps']:,} steps from {starts} start{'' if starts == 1 else 's'}"
-
-
-def _by(row: Row) -> str:
-    """Which known strategy has the gain, if it is not the one of the search alone."""
-    return f" by the strategy of {row['best_known']}" if row["best_known"] else ""
-
-
-def _nor(row: Row) -> str:
-    known = row["known"]
-    if not known:
-        return ""
-    return f", nor {'is' if known == 1 else 'are any of'} {known} other strateg{'y' if known == 1 else 'ies'} better"
 
 
 def _share(row: Row) -> str:
@@ -260,7 +240,7 @@ def _solution(game: str, rows: pd.DataFrame) -> str:
     text = (
         f"In equilibrium the ego plays {sides['ego']}, the {game} driver {sides['non_ego']}: the ego fails in {rate} "
     )
-    text += f"of games{_held_out(first[0])} and earns {number(first[0]['solution_payoff'], 2)}."
+    text += f"of games and earns {number(first[0]['solution_payoff'], 2)}."
     more = int(solved["number"].max()) - 1
     return text + (f" {more} more {'is' if more == 1 else 'are'} in the table." if more else "")
 
@@ -271,17 +251,10 @@ def _safest(rows: Sequence[Row]) -> str:
     worst = [row["player"] for row in rows if row["role"] == "non_ego" and row["failure_rate"] >= most - 1e-6]
     best = min(egos, key=lambda row: row["failure_rate"])
     text = f"The safest choice of egos is {_mixture(egos)}: in the worst case it fails in {percent(most)} of games"
-    text += _held_out(egos[0])
     text += f" (against {', '.join(worst)})." if most > 0 else "."
     if sum(row["share"] > 0 for row in egos) > 1:
         text += f" The safest single ego is {best['player']}, with {percent(best['failure_rate'])} in the worst case."
     return text
-
-
-def _held_out(row: Row) -> str:
-    """The failure rate in games that did not choose the shares."""
-    rate = row["held_out_failure_rate"]
-    return f" ({percent(rate)} in games that did not choose it)" if math.isfinite(rate) else ""
 
 
 def _mixture(rows: Sequence[Row]) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import math
 import re
-from dataclasses import replace
 
 import pandas as pd
 import pytest
@@ -145,14 +144,12 @@ EGO, NON_EGO = (
         response_arm=f"best_{role}",
         ego="retrained_speedy",
         non_ego="speedy",
-        steps=600_000,
-        starts=2,
     )
     for role in ("ego", "non_ego")
 )
 
 
-def verdict_texts(ego_gain, non_ego_gain, responses=(EGO, NON_EGO), failing=0, games=100, ego_of_other=0.0):
+def verdict_texts(ego_gain, non_ego_gain, responses=(EGO, NON_EGO), failing=0, games=100):
     """The verdict on a pair of which the ego earns 10, the speedy driver 20; gains alternate a little around a mean."""
     wave = [0.01 * (-1) ** place for place in range(games)]
 
@@ -164,9 +161,7 @@ def verdict_texts(ego_gain, non_ego_gain, responses=(EGO, NON_EGO), failing=0, g
         return arm(name, 1, [1] * failed + [0] * (games - failed), *sides)
 
     episodes = table(
-        arm_of("pair", failed=3),
-        arm_of("best_ego", ego_gain),
-        arm_of("best_non_ego", ego_of_other, non_ego_gain, failing),
+        arm_of("pair", failed=3), arm_of("best_ego", ego_gain), arm_of("best_non_ego", 0, non_ego_gain, failing)
     )
     ((persona, verdict),) = gap_verdicts(gaps(responses, episodes, 0.01))
     assert persona == "speedy"
@@ -188,38 +183,19 @@ FAILS = "A speedy driver newly trained against this ego makes it fail in 12 of 1
             "harm",
         ),
         (
-            (-0.0005, -0.0005),
+            (-0.2, -0.4),
             {"failing": 12},
             "not refuted",
-            "600,000 steps from 2 starts found nothing better for the ego; 600,000 steps from 2 starts found nothing "
-            f"better for the speedy driver: {MEANINGS[NEAR]}.",
+            f"For the ego nothing better was found; for the speedy driver nothing better was found: {MEANINGS[NEAR]}.",
             f"{FAILS} of 3, but this driver does not earn more by it.",
             "harm",  # the ego fails more, whatever for
         ),
         (
-            (-0.2, -0.0005),
-            {"failing": 12},
-            "not decided",
-            "The search for the ego lacks power: 600,000 steps from 2 starts end 2 % below its own strategy; 600,000 "
-            f"steps from 2 starts found nothing better for the speedy driver: {MEANINGS[OPEN]}.",
-            f"{FAILS} of 3, but this driver does not earn more by it.",
-            "harm",
-        ),
-        (
-            (-0.0005, 0),
+            (-0.2, 0),
             {"responses": (EGO,)},
             "not decided",
-            "600,000 steps from 2 starts found nothing better for the ego; no best response of the speedy driver was "
-            f"trained: {MEANINGS[OPEN]}.",
-            "",
-            "open",
-        ),
-        (
-            (-0.0005, 0),
-            {"responses": (replace(EGO, known_arms=("best_non_ego",)),), "ego_of_other": 0.5},
-            "no",
-            "The ego could still gain 5 % of its payoff by the strategy of best_non_ego; no best response of the "
-            f"speedy driver was trained: {MEANINGS[NO]}.",
+            "For the ego nothing better was found; no best response of the speedy driver was trained: "
+            f"{MEANINGS[OPEN]}.",
             "",
             "open",
         ),
@@ -235,8 +211,8 @@ def test_words__a_gain_not_distinguishable_from_0_has_its_interval():
     ((_, answer),) = gap_verdicts(row.assign(ci_low=-1.0, ci_high=13.0))
     assert answer.tone == "open"  # nothing is shown, neither way
     assert plain(answer.sentence).startswith(
-        "600,000 steps from 2 starts found a gain of 30 % for the ego, which is not distinguishable from 0 (95 %: −5 "
-        "to 65 %); 600,000 steps"
+        "For the ego a gain of 30 % was measured, which is not distinguishable from 0 (95 %: −5 to 65 %); "
+        "for the speedy driver"
     )
 
 
@@ -244,7 +220,7 @@ def test_words__a_gain_not_distinguishable_from_0_has_its_interval():
 def test_words__state_a_gain_only_where_it_is_distinguishable_from_0(verdict):
     row = gaps([EGO, NON_EGO], table(arm("pair", ego_failed=[0, 0])), 0.01)
     reason = "the speedy driver can't drive this scene" if verdict is GapVerdict.NOT_ANSWERED else ""
-    row = row.assign(verdict=verdict.value, gap_share=0.1, gap=1.0, p_holm=0.2, reason=reason, payoff=10.0)
+    row = row.assign(verdict=verdict.value, gap_share=0.1, gap=1.0, p_holm=0.2, reason=reason)
     ((_, answer),) = gap_verdicts(row)
     assert ("could still gain" in answer.sentence) == (verdict is GapVerdict.DISTINGUISHABLE)
     assert (answer.label == "no") == (verdict is GapVerdict.DISTINGUISHABLE)
@@ -277,10 +253,6 @@ def test_words__of_an_equilibrium_name_shares_failures_and_payoff():
     assert plain(nash) == (
         "In equilibrium the ego plays 50 % naive + 50 % retrained, the speedy driver 50 % speedy + 50 % "
         "speedy_round2: the ego fails in 15 % of games and earns 0.00."
-    )
-    held_out = equilibria(cells).assign(held_out_failure_rate=0.2)
-    assert "in 13.3 % of games (20 % in games that did not choose it) (against" in plain(
-        equilibrium_sentences(held_out)[1][2][0]
     )
     assert plain(safest) == (
         "The safest choice of egos is 33.3 % naive + 66.7 % retrained: in the worst case it fails in 13.3 % of games "

@@ -137,8 +137,6 @@ def a_campaign(
                     response_arm=best["arm"][0],
                     ego=ego,
                     non_ego=non_ego,
-                    steps=600_000,
-                    starts=2,
                 )
             )
     return table(*arms), pairings, responses

@@ -106,8 +106,6 @@ def equilibrium_before(stage: Stage, folder: RunFolder, significance: float) -> 
                 response_arm=arm,
                 ego="",
                 non_ego="",
-                steps=0,  # the budget and the other strategies are for the table: here the search alone counts
-                starts=0,
                 alone=gate.bounds,
             )
             for role, arm in zip(roles, responses, strict=True)

@@ -16,14 +16,13 @@ from harness.evaluation.strategies import (
     Arm,
     EgoStrategy,
     NonEgoStrategy,
-    PersonaNonEgo,
     ReconfiguredEgo,
     RetrainedEgo,
     RobustEgo,
     round_of,
     strategy_name,
 )
-from harness.game.roles import EGO, ROLES
+from harness.game.roles import ROLES
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,8 +74,6 @@ def _pair(arm: Arm) -> tuple[EgoStrategy, NonEgoStrategy]:
 
 def _responses(campaign: Campaign, stages: Sequence[AssessmentStage]) -> list[Response]:
     """The arms in which a best response replaces a player, of pairs that are done too."""
-    if campaign.best_response is None:
-        return []
     done = {(stage.arm, stage.seed) for stage in stages}
     found = []
     for stage in stages:
@@ -94,36 +91,10 @@ def _responses(campaign: Campaign, stages: Sequence[AssessmentStage]) -> list[Re
                 response_arm=stage.name,
                 ego=strategy_name(ego),
                 non_ego=strategy_name(non_ego),
-                steps=campaign.best_response.steps,
-                starts=campaign.best_response.starts,
-                known_arms=_known_arms(stage, stages),
                 alone=alone_bounds(campaign, arm.pair),
             )
         )
     return found
-
-
-def _known_arms(response: AssessmentStage, stages: Sequence[AssessmentStage]) -> tuple[str, ...]:
-    """The arms of a seed in which the other player of a best response meets another strategy of the same player: of an
-    ego any, of a person one of the same persona, so that its payoff is the same."""
-    role = response.arm.best_response_of
-    return tuple(
-        stage.name
-        for stage in stages
-        if stage.seed == response.seed
-        and stage.arm.pair != response.arm.pair
-        and stage.arm.best_response_of in (None, role)
-        and _meets_the_same(stage.arm, response.arm, role)
-    )
-
-
-def _meets_the_same(arm: Arm, response: Arm, role: int | None) -> bool:
-    if role == EGO:
-        return arm.ego is not None and arm.non_ego == response.non_ego
-    person, own = arm.non_ego, response.non_ego
-    if not (isinstance(person, PersonaNonEgo) and isinstance(own, PersonaNonEgo)):
-        return False
-    return arm.ego == response.ego and person.persona == own.persona and person.borrowed is None
 
 
 def _training_personas(campaign: Campaign, stages: Sequence[AssessmentStage]) -> dict[str, list[str]]:

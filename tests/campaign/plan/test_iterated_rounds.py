@@ -330,26 +330,3 @@ def test_campaign__names_without_a_meaning_are_refused(
         open_campaign(write_campaign(tmp_path, personas=both, **changes))
     assert key in str(error.value)
     assert words in str(error.value)
-
-
-# --- the strategies that bound a gap beside the search ------------------------
-
-
-def test_gap__is_bounded_by_every_other_strategy_that_met_the_same_player() -> None:
-    game = matchups("anna", "bert", rounds={"count": 4}, best_response=RESPONSE, crossplay={})
-    assert game is not None
-    known = {(each.role, each.pair_arm): set(each.known_arms) for each in game.responses}
-    ego = known["ego", "retrained_anna_round4_vs_anna_round3"]
-    # every other ego that met anna of round 3, those trained against bert too
-    others = ("naive", "retrained_anna", "retrained_bert", "retrained_bert_round4")
-    assert ego == {f"{name}_vs_anna_round3" for name in others}
-    # a person's payoff is its persona's: bert is no response of anna
-    person = known["non_ego", "retrained_anna_round4_vs_anna_round3"]
-    assert person == {"retrained_anna_round4_vs_anna"}
-
-
-def test_gap__without_a_cross_play_the_arms_of_the_rounds_are_known() -> None:
-    game = matchups("anna", best_response=RESPONSE)
-    assert game is not None
-    known = {each.role: each.known_arms for each in game.responses}
-    assert known == {"ego": ("naive_vs_anna",), "non_ego": ()}

@@ -21,8 +21,6 @@ EGO = Response(
     response_arm="best_ego",
     ego="retrained_speedy",
     non_ego="speedy",
-    steps=600_000,
-    starts=2,
 )
 NON_EGO = replace(EGO, role="non_ego", response_arm="best_non_ego")
 
@@ -75,11 +73,11 @@ def test_gap__is_a_share_of_the_payoffs_size_also_where_the_payoff_is_negative_o
     [
         ([3.0, 2.9, 3.1, 3.0, 3.05, 2.95], GapVerdict.DISTINGUISHABLE),
         ([3.0, -2.9, 3.1, -3.0, 3.05, -2.95], GapVerdict.NOT_DISTINGUISHABLE),
-        ([-3.0, -2.9, -3.1, -3.0, -3.05, -2.95], GapVerdict.LACKS_POWER),
+        ([-3.0, -2.9, -3.1, -3.0, -3.05, -2.95], GapVerdict.NONE_FOUND),
         ([1.0, -1.0, 2.0, -2.0, 3.0, -3.0], GapVerdict.NONE_FOUND),
         ([0.0] * 6, GapVerdict.NO_DIFFERENCE),
         ([2.0] * 6, GapVerdict.ALL_EQUAL),
-        ([-2.0] * 6, GapVerdict.LACKS_POWER),
+        ([-2.0] * 6, GapVerdict.NONE_FOUND),
         ([2.0], GapVerdict.NOT_ENOUGH_PAIRS),
     ],
 )
@@ -90,8 +88,6 @@ def test_verdict__of_each_gain(better_by, verdict):
     best = arm("best_ego", ego_failed=[0] * count, ego_payoff=payoffs + better_by)
     row = one(EGO, pair, best)
     assert row["verdict"] == verdict.value
-    assert (row["search_steps"], row["search_starts"], row["known"], row["best_known"]) == (600_000, 2, 0, "")
-    assert row["search_gap"] == row["gap"]
     if verdict in (GapVerdict.NO_DIFFERENCE, GapVerdict.ALL_EQUAL) or len(set(better_by)) == 1:
         assert all(math.isnan(row[name]) for name in ("p_value", "p_holm", "ci_low", "ci_high"))
 
@@ -118,43 +114,6 @@ def test_pairs__an_arm_that_was_never_played_leaves_every_number_empty():
     )  # never 0, and no failure rate
 
 
-# --- the best known strategy ---
-
-
-def known(*payoffs, search=(0.0,) * 8, own=(10.0,) * 8):
-    """The gap of an ego that earns 10 in each of 8 games, of a search and of other strategies in the same games."""
-    arms = [arm("pair", ego_failed=[0] * 8, ego_payoff=own), arm("best_ego", ego_failed=[0] * 8, ego_payoff=search)]
-    names = [f"other{place}" for place in range(len(payoffs))]
-    arms += [arm(name, ego_failed=[1] * 8, ego_payoff=each) for name, each in zip(names, payoffs, strict=True)]
-    return one(replace(EGO, known_arms=tuple(names)), *arms)
-
-
-def test_gap__is_bounded_by_a_known_strategy_that_is_better_than_the_search():
-    row = known([11.0, 12.0] * 4, [10.5] * 8)
-    assert (row["gap"], row["known"], row["best_known"]) == (1.5, 2, "other0")
-    assert (row["search_gap"], row["ego_failure_rate_best_response"]) == (-10, 1)
-    assert row["verdict"] == GapVerdict.DISTINGUISHABLE.value
-
-
-def test_gap__each_half_of_the_games_chooses_for_the_other():
-    # in even games other0 earns 20, in odd ones 0; other1 the reverse: what is better in one half is worse in the other
-    row = known([20.0, 0.0] * 4, [0.0, 20.0] * 4)
-    assert row["payoff_best_response"] == 0  # the best of all games would have 10, the best of each game 20
-    assert row["best_known"] == "other0 + other1"
-
-
-def test_gap__a_known_strategy_that_was_not_played_is_none():
-    arms = [arm("pair", ego_failed=[0] * 4), arm("best_ego", ego_failed=[0] * 4)]
-    row = one(replace(EGO, known_arms=("nowhere",)), *arms)
-    assert (row["known"], row["pairs"], row["pairs_left_out"]) == (0, 4, 0)
-
-
-def test_verdict__a_search_below_the_players_own_strategy_lacks_power_unless_a_known_one_gains():
-    assert known(search=[9.0, 9.5] * 4)["verdict"] == GapVerdict.LACKS_POWER.value
-    assert known([9.0] * 8, search=[9.5, 10.4] * 4)["verdict"] == GapVerdict.NONE_FOUND.value  # its interval contains 0
-    assert known([11.0, 12.0] * 4, search=[9.0, 9.5] * 4)["verdict"] == GapVerdict.DISTINGUISHABLE.value
-
-
 # --- when rounds stop ---
 
 
@@ -168,8 +127,7 @@ def stopping(ego_gain, non_ego_gain, games=30):
 
 
 @pytest.mark.parametrize(
-    ("ego_gain", "non_ego_gain", "nothing"),
-    [(0, 0, True), (-0.2, 0, True), (-2, 0, False), (2, 0, False), (0, 2, False)],
+    ("ego_gain", "non_ego_gain", "nothing"), [(0, 0, True), (-2, 0, True), (2, 0, False), (0, 2, False)]
 )
 def test_nothing_to_gain__if_neither_gap_is_distinguishable_from_0(ego_gain, non_ego_gain, nothing):
     assert nothing_to_gain(stopping(ego_gain, non_ego_gain)) == nothing
