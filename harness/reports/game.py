@@ -12,13 +12,25 @@ from typing import Any
 import pandas as pd
 
 from harness.evaluation.competence import Verdict
-from harness.evaluation.game_theory.best_response_gap import NOTHING_TO_GAIN, GapVerdict
+from harness.evaluation.game_theory.best_response_gap import NOTHING_TO_GAIN, SEARCH, GapVerdict
 from harness.evaluation.game_theory.empirical_game import ALL, SolutionKind
 from harness.evaluation.game_theory.findings import GameFindings
 from harness.reports.data_table import table
 from harness.reports.game_links import GameLinks
 from harness.reports.heatmaps import views
-from harness.reports.numbers import MISSING, NO_SPACE, SURE, interval, number, p_text, percent, signed, sure, trimmed
+from harness.reports.numbers import (
+    MINUS,
+    MISSING,
+    NO_SPACE,
+    SURE,
+    interval,
+    number,
+    p_text,
+    percent,
+    signed,
+    sure,
+    trimmed,
+)
 from harness.reports.run_tables import Row
 from harness.reports.verdict_wording import NOT_ANSWERED, Answer, as_sentence, left_out
 
@@ -123,24 +135,27 @@ def _both_sides(persona: str, ego: Row | None, non_ego: Row | None) -> str:
     driver = f"the {persona} driver"
     gains = [each for each in (ego, non_ego) if each is not None and each["verdict"] == GapVerdict.DISTINGUISHABLE]
     if non_ego is not None and [math.isfinite(each["gap_share"]) for each in gains] == [True, True]:
-        return f"{_side('the ego', ego)}; {driver} {_share(non_ego)}"
+        return f"{_side('the ego', ego)}; {driver} {_share(non_ego)}{_by_playing(non_ego)}"
     return f"{_side('the ego', ego)}; {_side(driver, non_ego)}"
 
 
 def _induced_failures(row: Row) -> str:
-    """How often the ego fails against a persona that was newly trained against it."""
+    """How often the ego fails against the best known response of a persona to it."""
     games, rate = row["pairs"], row["ego_failure_rate_best_response"]
     if not games:
         return f"The effect of a {row['persona']} driver newly trained against this ego was not measured."
     span = sure(row["ego_failure_rate_best_response_low"], row["ego_failure_rate_best_response_high"])
     counts = f"{round(rate * games)} of {games} games ({percent(rate)}; {span})"
-    text = f"{_newly_trained(str(row['persona']))} {counts} instead of {round(row['ego_failure_rate'] * games)}"
-    if GapVerdict(row["verdict"]) is GapVerdict.NONE_FOUND:
+    text = f"{_responding(str(row['persona']), row)} {counts} instead of {round(row['ego_failure_rate'] * games)}"
+    if row["gap"] <= 0:
         return f"{text}, but this driver does not earn more by it."
     return f"{text}."
 
 
-def _newly_trained(persona: str) -> str:
+def _responding(persona: str, *rows: Row) -> str:
+    """The persona with its best known responses of these rows."""
+    if any(_known(row) for row in rows):
+        return f"A {persona} driver with its best known response makes this ego fail in"
     return f"A {persona} driver newly trained against this ego makes it fail in"
 
 
@@ -149,21 +164,62 @@ def _side(player: str, row: Row | None) -> str:
         return f"no best response of {player} was trained"
     match GapVerdict(row["verdict"]):
         case GapVerdict.DISTINGUISHABLE:
-            return f"{player} could still gain {_share(row)} of its payoff"
+            return f"{player} could still gain {_share(row)} of its payoff{_by_playing(row)}"
         case GapVerdict.BEFORE_HOLM_ONLY:
             holm = f"but not after Holm's correction ({p_text(row['p_holm'])})"
-            return f"{player} might gain {_share(row)} of its payoff, {holm}"
+            return f"{player} might gain {_share(row)} of its payoff{_by_playing(row)}, {holm}"
         case GapVerdict.NOT_DISTINGUISHABLE:
-            measured = f"for {player} a gain of {_share(row)} was measured"
+            measured = f"after {_budget(row)} a gain of {_share(row)}{_by_playing(row)} was measured for {player}"
             return f"{measured}, which is not distinguishable from 0{_span(row)}"
         case GapVerdict.NONE_FOUND:
-            return f"for {player} nothing better was found"
+            return _nothing_better(player, row)
+        case GapVerdict.LACKS_POWER:
+            below = f"{_budget(row)} end {_below(row)} its own strategy"
+            return f"the search for {player} lacks power: {below}"
         case GapVerdict.NO_DIFFERENCE:
             return f"the best response of {player} earns the same in every game"
         case GapVerdict.ALL_EQUAL:
-            return f"{player} gains {_share(row)} of its payoff, the same in every game: there is no test"
+            gain = f"{_share(row)} of its payoff{_by_playing(row)}"
+            return f"{player} gains {gain}, the same in every game: there is no test"
         case _:
             return f"for {player} too few games could be compared"
+
+
+def _budget(row: Row) -> str:
+    """What the search had, e.g. "600,000 steps from 2 starts"."""
+    starts = row["search_starts"]
+    return f"{number(row['search_steps'], 0)} steps from {starts} {'start' if starts == 1 else 'starts'}"
+
+
+def _known(row: Row) -> list[str]:
+    """The known strategies that were taken as best response, beside the search or in its place."""
+    return [name for name in row["best_known"].split(" + ") if name not in ("", SEARCH)]
+
+
+def _by_playing(row: Row) -> str:
+    """The known strategies by which the gain was measured; empty where the search alone found it."""
+    names = _known(row)
+    if names and row["best_known"].startswith(SEARCH):
+        names = ["the newly trained strategy", *names]
+    return f" by playing {' or '.join(names)}" if names else ""
+
+
+def _nothing_better(player: str, row: Row) -> str:
+    known = row["known"]
+    others = f"{known} other {'strategy' if known == 1 else 'strategies'}"
+    if row["search_gap"] > 0:  # the search alone earned more: what was taken in the halves of the games did not
+        choice = f"the best of {_budget(row)} and {others} of this campaign"
+        return f"for {player} {choice} earns no more in games that did not choose it"
+    nor = f", nor {'does' if known == 1 else 'do'} {others} of this campaign earn more" if known else ""
+    return f"{_budget(row)} found nothing better for {player}{nor}"
+
+
+def _below(row: Row) -> str:
+    """How far below the player's own strategy the search ended."""
+    if row["payoff"]:
+        below = signed(row["search_gap"] / abs(row["payoff"]) * 100, 1).lstrip(MINUS)
+        return f"{below}{NO_SPACE}% below"
+    return f"{number(-row['search_gap'], 2)} below the 0 of"
 
 
 def _share(row: Row) -> str:
@@ -198,7 +254,9 @@ def _of_pairs(persona: str, pairs: Sequence[Sequence[Row]]) -> Answer:
     sentence = "; ".join(
         f"in {count} of {several} {unit} {findings[label]}" for label, count in counts.items() if count
     )
-    headline = next((label for label in (NO, NEAR, OPEN) if counts[label]), NOT_ANSWERED)
+    # "not refuted" is no headline beside a pair of which a search lacks power
+    weak = GapVerdict.LACKS_POWER in [row["verdict"] for rows in pairs for row in rows]
+    headline = next((label for label in ((NO, OPEN) if weak else (NO, NEAR, OPEN)) if counts[label]), NOT_ANSWERED)
     measured = [row for rows in pairs for row in rows if not row["reason"] and row["pairs"]]
     responders = [row for row in measured if row["role"] == "non_ego"]
     return Answer(
@@ -216,7 +274,7 @@ def _induced_in_several(persona: str, responders: Sequence[Row], unit: str) -> s
         return ""
     rates = [row["ego_failure_rate_best_response"] for row in responders]
     before = sum(row["ego_failure_rate"] for row in responders) / len(rates)
-    text = f"{_newly_trained(persona)} {percent(sum(rates) / len(rates))} of games "
+    text = f"{_responding(persona, *responders)} {percent(sum(rates) / len(rates))} of games "
     return f"{text}(mean of {len(rates)} {unit}: {interval(min(rates), max(rates))}) instead of {percent(before)}."
 
 
@@ -237,10 +295,8 @@ def _solution(game: str, rows: pd.DataFrame) -> str:
     first = solved[solved["number"] == 1].to_dict("records")
     sides = {role: _mixture([row for row in first if row["role"] == role]) for role in ("ego", "non_ego")}
     rate = percent(first[0]["solution_failure_rate"])
-    text = (
-        f"In equilibrium the ego plays {sides['ego']}, the {game} driver {sides['non_ego']}: the ego fails in {rate} "
-    )
-    text += f"of games and earns {number(first[0]['solution_payoff'], 2)}."
+    text = f"In equilibrium the ego plays {sides['ego']}, the {game} driver {sides['non_ego']}: the ego fails in {rate}"
+    text += f" of games{_held_out(first[0])} and earns {number(first[0]['solution_payoff'], 2)}."
     more = int(solved["number"].max()) - 1
     return text + (f" {more} more {'is' if more == 1 else 'are'} in the table." if more else "")
 
@@ -251,10 +307,15 @@ def _safest(rows: Sequence[Row]) -> str:
     worst = [row["player"] for row in rows if row["role"] == "non_ego" and row["failure_rate"] >= most - 1e-6]
     best = min(egos, key=lambda row: row["failure_rate"])
     text = f"The safest choice of egos is {_mixture(egos)}: in the worst case it fails in {percent(most)} of games"
-    text += f" (against {', '.join(worst)})." if most > 0 else "."
+    text += _held_out(egos[0]) + (f", against {', '.join(worst)}." if most > 0 else ".")
     if sum(row["share"] > 0 for row in egos) > 1:
         text += f" The safest single ego is {best['player']}, with {percent(best['failure_rate'])} in the worst case."
     return text
+
+
+def _held_out(row: Row) -> str:
+    rate = row["held_out_failure_rate"]
+    return f" ({percent(rate)} in games that did not choose it)" if math.isfinite(rate) else ""
 
 
 def _mixture(rows: Sequence[Row]) -> str:

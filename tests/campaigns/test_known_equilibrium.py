@@ -300,7 +300,7 @@ def gaps_of(matrix: Matrix, arm: str) -> pd.DataFrame:
 def test_gap__at_an_equilibrium_there_is_none(role: str, matrix: Matrix) -> None:
     row = gaps_of(matrix, EQUILIBRIUM).loc[role]
     won = matrix.payoffs(f"{EQUILIBRIUM}_{role}_response", role) - matrix.payoffs(EQUILIBRIUM, role)
-    assert row["pairs"] == 20
+    assert (row["pairs"], row["known"]) == (20, 2)
     assert won.max() <= 1e-9  # whatever was learned
     assert GapVerdict(row["verdict"]) in NOTHING_TO_GAIN
     assert row["gap"] == 0.0 if np.isnan(row["ci_low"]) else row["ci_low"] <= 0.0 <= row["ci_high"]
@@ -309,7 +309,7 @@ def test_gap__at_an_equilibrium_there_is_none(role: str, matrix: Matrix) -> None
 @pytest.mark.slow
 @pytest.mark.parametrize("role", ROLES)
 @pytest.mark.parametrize("arm", NO_EQUILIBRIA)
-def test_gap__away_from_one_it_is_what_the_formula_says(arm: str, role: str, matrix: Matrix) -> None:
+def test_gap__away_from_one_it_is_what_the_formula_says_and_the_search_finds_much_of_it(arm: str, role: str, matrix: Matrix) -> None:
     row, both = gaps_of(matrix, arm).loc[role], CELLS[arm][0]
     better = (-both, both) if role == "ego" else (both, -both)
     won = matrix.payoffs(f"{arm}_{role}_response", role) - matrix.payoffs(arm, role)
@@ -317,10 +317,11 @@ def test_gap__away_from_one_it_is_what_the_formula_says(arm: str, role: str, mat
     ahead, faster = all_starts()
     in_all = WEIGHTS[role] * (by_hand(ahead, faster, *better) - by_hand(ahead, faster, both, both)).mean()
     assert GapVerdict(row["verdict"]) == GapVerdict.DISTINGUISHABLE
-    assert row["gap"] == pytest.approx(won.mean())
-    assert row["ci_low"] < in_all
+    assert row["gap"] == pytest.approx(in_these)  # the other strategy of the campaign is the best response
+    assert row["ci_low"] < in_all < row["ci_high"]
+    assert row["search_gap"] == pytest.approx(won.mean())
     assert (won <= WEIGHTS[role] * (matrix.by_hand(*better) - matrix.by_hand(both, both)) + 1e-9).all()
-    assert row["gap"] > FOUND * in_these
+    assert row["search_gap"] > FOUND * in_these
 
 
 @pytest.mark.slow
@@ -372,6 +373,8 @@ class Coin:
             response_arm="response",
             ego="coin",
             non_ego="coin",
+            search_steps=600_000,
+            search_starts=2,
         )
         answer = mixture_of(response, self.personas[EGO])
         episodes = pd.concat([self.games("pair", self.player), self.games("response", answer)], ignore_index=True)

@@ -256,6 +256,33 @@ def test_matchups__a_response_has_the_pair_and_round_that_it_belongs_to() -> Non
     }
 
 
+def test_matchups__a_response_knows_the_strategies_that_met_the_same_other_player_with_the_same_payoff() -> None:
+    response = {**RESPONSE, "arms": ["naive_vs_anna_round3"]}
+    changes = {"rounds": {"count": 3, "stop_early": False}, "crossplay": {"egos": ["sumo"]}}
+    found = matchups(*BOTH, best_response=response, **changes)
+    assert found is not None
+    (ego, non_ego) = (each for each in found.responses if each.pair_arm == "retrained_anna_vs_anna_round3")
+    assert (ego.search_steps, ego.search_starts) == (2048, 2)
+    assert ego.known_arms == {
+        "naive": "naive_vs_anna_round3",
+        "retrained_bert": "retrained_bert_vs_anna_round3",
+        "sumo": "sumo_vs_anna_round3",
+        "naive_vs_anna_round3_ego_response": "naive_vs_anna_round3_ego_response",
+    }
+    # neither bert's nor SUMO's driver has anna's payoff
+    assert non_ego.known_arms == {"anna": "retrained_vs_anna"}
+    (_, non_ego) = (each for each in found.responses if each.pair_arm == "naive_vs_anna_round3")
+    assert non_ego.known_arms == {"anna": "naive_vs_anna"}
+
+
+def test_matchups__a_response_does_not_know_the_strategies_of_another_seed() -> None:
+    campaign = campaign_of("anna", seeds=[1, 2], crossplay={}, best_response=RESPONSE)
+    names = [f"retrained_vs_anna{ending}-seed1" for ending in ("", "_ego_response")]
+    found = matchups_of(campaign, ["anna"], {*names, "naive_vs_anna-seed2"})
+    assert found is not None
+    assert [each.known_arms for each in found.responses] == [{}]
+
+
 @pytest.mark.parametrize(
     ("written", "name"),
     [
