@@ -53,7 +53,8 @@ def acceptance_lines(checks: Sequence[Check], seeds: int) -> list[Line]:
 def sentence(check: Check) -> str:
     """What was measured and where, the end of the interval, the bound, and what the value is made of."""
     if not check.measured:
-        return "not measured" if check.games else f"not measured: {check.arm} was not played"
+        reason = check.detail or ("" if check.games else f"{check.arm} was not played")
+        return f"not measured: {reason}" if reason else "not measured"
     value, limit, allowed = (_value(check.bound, each) for each in (check.value, check.limit, check.allowed))
     words = (
         f"{value} in {check.games:,} games of {check.arm}; with {SURE} confidence at most {limit}; allowed: {allowed}"

@@ -309,7 +309,7 @@ def test_gap__at_an_equilibrium_there_is_none(role: str, matrix: Matrix) -> None
 @pytest.mark.slow
 @pytest.mark.parametrize("role", ROLES)
 @pytest.mark.parametrize("arm", NO_EQUILIBRIA)
-def test_gap__away_from_one_it_is_what_the_formula_says_and_the_search_finds_much_of_it(arm: str, role: str, matrix: Matrix) -> None:
+def test_gap__away_from_one_it_is_what_the_formula_says(arm: str, role: str, matrix: Matrix) -> None:
     row, both = gaps_of(matrix, arm).loc[role], CELLS[arm][0]
     better = (-both, both) if role == "ego" else (both, -both)
     won = matrix.payoffs(f"{arm}_{role}_response", role) - matrix.payoffs(arm, role)
