@@ -12,23 +12,19 @@ from typing import Any
 import pandas as pd
 
 from harness.evaluation.competence import Verdict
-from harness.evaluation.game_theory.best_response_gap import NOTHING_TO_GAIN, SEARCH, GapVerdict
+from harness.evaluation.game_theory.best_response_gap import NOTHING_TO_GAIN, GapVerdict
 from harness.evaluation.game_theory.empirical_game import ALL, SolutionKind
 from harness.evaluation.game_theory.findings import GameFindings
 from harness.reports.data_table import table
 from harness.reports.game_links import GameLinks
+from harness.reports.gap_sentences import both_sides, induced_failures, induced_in_several
 from harness.reports.heatmaps import views
 from harness.reports.numbers import (
-    MINUS,
     MISSING,
-    NO_SPACE,
-    SURE,
     interval,
     number,
-    p_text,
     percent,
     signed,
-    sure,
     trimmed,
 )
 from harness.reports.run_tables import Row
@@ -113,7 +109,7 @@ def _of_pair(rows: Sequence[Row]) -> Answer:
     if reason := rows[0]["reason"]:  # the same of both sides
         return Answer(question=QUESTION, seed=seed, label=NOT_ANSWERED, sentence=as_sentence(reason))
     label = _label([GapVerdict(row["verdict"]) for row in rows], both=ego is not None and non_ego is not None)
-    sentence = f"{_both_sides(str(rows[0]['persona']), ego, non_ego)}: {MEANINGS[label]}."
+    sentence = f"{both_sides(str(rows[0]['persona']), ego, non_ego)}: {MEANINGS[label]}."
     harmful = non_ego is not None and non_ego["failure_difference_low"] > 0
     return Answer(
         question=QUESTION,
@@ -121,7 +117,7 @@ def _of_pair(rows: Sequence[Row]) -> Answer:
         label=label,
         tone="harm" if harmful else "open",  # "not refuted" is no yes
         sentence=sentence[0].upper() + sentence[1:] + "".join(map(left_out, rows)),
-        speed="" if non_ego is None else _induced_failures(non_ego),
+        speed="" if non_ego is None else induced_failures(non_ego),
     )
 
 
@@ -129,112 +125,6 @@ def _label(verdicts: Sequence[GapVerdict], both: bool) -> str:
     if GapVerdict.DISTINGUISHABLE in verdicts:
         return NO
     return NEAR if both and NOTHING_TO_GAIN.issuperset(verdicts) else OPEN
-
-
-def _both_sides(persona: str, ego: Row | None, non_ego: Row | None) -> str:
-    driver = f"the {persona} driver"
-    gains = [each for each in (ego, non_ego) if each is not None and each["verdict"] == GapVerdict.DISTINGUISHABLE]
-    if non_ego is not None and [math.isfinite(each["gap_share"]) for each in gains] == [True, True]:
-        return f"{_side('the ego', ego)}; {driver} {_share(non_ego)}{_by_playing(non_ego)}"
-    return f"{_side('the ego', ego)}; {_side(driver, non_ego)}"
-
-
-def _induced_failures(row: Row) -> str:
-    """How often the ego fails against the best known response of a persona to it."""
-    games, rate = row["pairs"], row["ego_failure_rate_best_response"]
-    if not games:
-        return f"The effect of a {row['persona']} driver newly trained against this ego was not measured."
-    span = sure(row["ego_failure_rate_best_response_low"], row["ego_failure_rate_best_response_high"])
-    counts = f"{round(rate * games)} of {games} games ({percent(rate)}; {span})"
-    text = f"{_responding(str(row['persona']), row)} {counts} instead of {round(row['ego_failure_rate'] * games)}"
-    if row["gap"] <= 0:
-        return f"{text}, but this driver does not earn more by it."
-    return f"{text}."
-
-
-def _responding(persona: str, *rows: Row) -> str:
-    """The persona with its best known responses of these rows."""
-    if any(_known(row) for row in rows):
-        return f"A {persona} driver with its best known response makes this ego fail in"
-    return f"A {persona} driver newly trained against this ego makes it fail in"
-
-
-def _side(player: str, row: Row | None) -> str:
-    if row is None:
-        return f"no best response of {player} was trained"
-    match GapVerdict(row["verdict"]):
-        case GapVerdict.DISTINGUISHABLE:
-            return f"{player} could still gain {_share(row)} of its payoff{_by_playing(row)}"
-        case GapVerdict.BEFORE_HOLM_ONLY:
-            holm = f"but not after Holm's correction ({p_text(row['p_holm'])})"
-            return f"{player} might gain {_share(row)} of its payoff{_by_playing(row)}, {holm}"
-        case GapVerdict.NOT_DISTINGUISHABLE:
-            measured = f"after {_budget(row)} a gain of {_share(row)}{_by_playing(row)} was measured for {player}"
-            return f"{measured}, which is not distinguishable from 0{_span(row)}"
-        case GapVerdict.NONE_FOUND:
-            return _nothing_better(player, row)
-        case GapVerdict.LACKS_POWER:
-            below = f"{_budget(row)} end {_below(row)} its own strategy"
-            return f"the search for {player} lacks power: {below}"
-        case GapVerdict.NO_DIFFERENCE:
-            return f"the best response of {player} earns the same in every game"
-        case GapVerdict.ALL_EQUAL:
-            gain = f"{_share(row)} of its payoff{_by_playing(row)}"
-            return f"{player} gains {gain}, the same in every game: there is no test"
-        case _:
-            return f"for {player} too few games could be compared"
-
-
-def _budget(row: Row) -> str:
-    """What the search had, e.g. "600,000 steps from 2 starts"."""
-    starts = row["search_starts"]
-    return f"{number(row['search_steps'], 0)} steps from {starts} {'start' if starts == 1 else 'starts'}"
-
-
-def _known(row: Row) -> list[str]:
-    """The known strategies that were taken as best response, beside the search or in its place."""
-    return [name for name in row["best_known"].split(" + ") if name not in ("", SEARCH)]
-
-
-def _by_playing(row: Row) -> str:
-    """The known strategies by which the gain was measured; empty where the search alone found it."""
-    names = _known(row)
-    if names and row["best_known"].startswith(SEARCH):
-        names = ["the newly trained strategy", *names]
-    return f" by playing {' or '.join(names)}" if names else ""
-
-
-def _nothing_better(player: str, row: Row) -> str:
-    known = row["known"]
-    others = f"{known} other {'strategy' if known == 1 else 'strategies'}"
-    if row["search_gap"] > 0:  # the search alone earned more: what was taken in the halves of the games did not
-        choice = f"the best of {_budget(row)} and {others} of this campaign"
-        return f"for {player} {choice} earns no more in games that did not choose it"
-    nor = f", nor {'does' if known == 1 else 'do'} {others} of this campaign earn more" if known else ""
-    return f"{_budget(row)} found nothing better for {player}{nor}"
-
-
-def _below(row: Row) -> str:
-    """How far below the player's own strategy the search ended."""
-    if row["payoff"]:
-        below = signed(row["search_gap"] / abs(row["payoff"]) * 100, 1).lstrip(MINUS)
-        return f"{below}{NO_SPACE}% below"
-    return f"{number(-row['search_gap'], 2)} below the 0 of"
-
-
-def _share(row: Row) -> str:
-    """The gap as a share of the payoff; where the payoff is 0, the gap itself."""
-    if math.isfinite(row["gap_share"]):
-        return percent(row["gap_share"])
-    return f"{number(row['gap'], 2)} above the 0"
-
-
-def _span(row: Row) -> str:
-    """The gap's interval as shares of the payoff; empty where there is none."""
-    if not (row["payoff"] and math.isfinite(row["ci_low"])):
-        return ""
-    low, high = (signed(row[end] / abs(row["payoff"]) * 100, 1) for end in ("ci_low", "ci_high"))
-    return f" ({SURE}: {low} to {high}{NO_SPACE}%)"
 
 
 def _of_pairs(persona: str, pairs: Sequence[Sequence[Row]]) -> Answer:
@@ -264,18 +154,9 @@ def _of_pairs(persona: str, pairs: Sequence[Sequence[Row]]) -> Answer:
         label=headline if headline in (OPEN, NOT_ANSWERED) else f"{headline} in {counts[headline]} of {several} {unit}",
         tone="harm" if "harm" in [answer.tone for answer in answers] else "open",
         sentence=f"{sentence[0].upper()}{sentence[1:]}.",
-        speed=_induced_in_several(persona, responders, unit),
+        speed=induced_in_several(persona, responders, unit),
         per_seed=answers,
     )
-
-
-def _induced_in_several(persona: str, responders: Sequence[Row], unit: str) -> str:
-    if not responders:
-        return ""
-    rates = [row["ego_failure_rate_best_response"] for row in responders]
-    before = sum(row["ego_failure_rate"] for row in responders) / len(rates)
-    text = f"{_responding(persona, *responders)} {percent(sum(rates) / len(rates))} of games "
-    return f"{text}(mean of {len(rates)} {unit}: {interval(min(rates), max(rates))}) instead of {percent(before)}."
 
 
 def equilibrium_sentences(equilibria: pd.DataFrame) -> list[tuple[int, str, list[str]]]:
