@@ -16,15 +16,13 @@ from typing import Annotated
 import pandas as pd
 import typer
 
-from harness.evaluation.tables import read_csv
-
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, help=__doc__)
 Run = Annotated[Path, typer.Argument(metavar="RUN", help="A run folder, or one of its tables.")]
 
 
 def read(run: Path, table: str) -> pd.DataFrame:
-    """A table of a run."""
-    return read_csv(run if run.is_file() else run / f"{table}.csv")
+    """A table of a run. That of an older run may lack columns that are not shown here."""
+    return pd.read_csv(run if run.is_file() else run / f"{table}.csv")
 
 
 def gaps_table(found: pd.DataFrame) -> str:

@@ -72,7 +72,8 @@ class Rounds(Document):
     (policy-space response oracles)."""
     stop_early: bool | None = None
     """Whether the rounds of a persona end early, when an approximate equilibrium is reached: neither player has a
-    best-response gap that is distinguishable from 0. Left out: yes if there is a table [best_response]."""
+    best-response gap that is distinguishable from 0, and no search ends below its player's own strategy. Left out: yes
+    if there is a table [best_response]."""
 
 
 class BestResponseSearch(Document):
@@ -156,7 +157,8 @@ class Acceptance(Document):
     speed_loss_mps: Annotated[float, Field(ge=0.0, le=100.0)] | None = None
     """Largest loss of average speed against a persona, compared with the naive ego in the same games."""
     gap_share: Annotated[float, Field(ge=0.0, le=1000.0)] | None = None
-    """Largest best-response gap of the ego, as a share of its payoff. Measured with [best_response]."""
+    """Largest best-response gap of the ego, as a share of its payoff. Measured with [best_response]. Not measured where
+    the search ends below the ego's own strategy."""
 
     @property
     def bounds(self) -> dict[str, float]:

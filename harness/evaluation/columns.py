@@ -250,14 +250,19 @@ _TABLES = {
         *_STRATEGIES,
         *_PAIRS,
         Column("payoff", NUMBER, "Mean payoff of the player of that role, over the pairs."),
-        Column("payoff_best_response", NUMBER, "That of its best response."),
-        Column("gap", NUMBER, "Mean of best response minus player; below 0: the training found nothing better."),
+        Column("payoff_best_response", NUMBER, "That of its best known response."),
+        Column("best_known", TEXT, "That response: `the search`, or another strategy or arm; two are joined by ` + `."),
+        Column("known", COUNT, "Other strategies of the player that were compared beside the search."),
+        Column("gap", NUMBER, "Mean of best known response minus player; below 0: nothing better is known."),
         Column("ci_low", NUMBER, f"The low end of its {_T}.", label="its 95 % low"),
         Column("ci_high", NUMBER, f"The high end of its {_T}.", label="its 95 % high"),
         Column("gap_share", NUMBER, "gap / |payoff|; empty where the payoff is 0.", unit=SHARE),
+        Column("search_steps", COUNT, "The budget of each training of the search."),
+        Column("search_starts", COUNT, "The trainings of the search."),
+        *Column("search_gap", NUMBER, "The gap of the search alone.").with_interval(_T),
         *(_P, _P_HOLM),
         *rate("ego_failure_rate", "Of the ego in the pair."),
-        *rate("ego_failure_rate_best_response", "The same with the best response in its place."),
+        *rate("ego_failure_rate_best_response", "The same with the best known response in place of the player."),
         *Column(
             "failure_difference", NUMBER, "Mean of ego failures with the best response minus without.", unit=POINTS
         ).with_interval(_T),
@@ -290,6 +295,12 @@ _TABLES = {
         ),
         Column(
             "solution_failure_rate", NUMBER, "Of the ego in this solution; safest: the mixture's worst.", unit=SHARE
+        ),
+        Column(
+            "held_out_failure_rate",
+            NUMBER,
+            "The same by 10-fold cross-validation over the episodes (nash: number 1 only).",
+            unit=SHARE,
         ),
         Column(
             "dominated_in_payoff", TEXT, "The strategy or mixture of its role that strictly dominates it; empty: none."

@@ -12,13 +12,22 @@ from typing import Any
 import pandas as pd
 
 from harness.evaluation.competence import Verdict
-from harness.evaluation.game_theory.best_response_gap import NOTHING_TO_GAIN, GapVerdict
+from harness.evaluation.game_theory.best_response_gap import NOTHING_TO_GAIN
 from harness.evaluation.game_theory.empirical_game import ALL, SolutionKind
 from harness.evaluation.game_theory.findings import GameFindings
+from harness.evaluation.gap_verdict import GapVerdict
 from harness.reports.data_table import table
 from harness.reports.game_links import GameLinks
+from harness.reports.gap_sentences import both_sides, induced_failures, induced_in_several
 from harness.reports.heatmaps import views
-from harness.reports.numbers import MISSING, NO_SPACE, SURE, interval, number, p_text, percent, signed, sure, trimmed
+from harness.reports.numbers import (
+    MISSING,
+    interval,
+    number,
+    percent,
+    signed,
+    trimmed,
+)
 from harness.reports.run_tables import Row
 from harness.reports.verdict_wording import NOT_ANSWERED, Answer, as_sentence, left_out
 
@@ -101,7 +110,7 @@ def _of_pair(rows: Sequence[Row]) -> Answer:
     if reason := rows[0]["reason"]:  # the same of both sides
         return Answer(question=QUESTION, seed=seed, label=NOT_ANSWERED, sentence=as_sentence(reason))
     label = _label([GapVerdict(row["verdict"]) for row in rows], both=ego is not None and non_ego is not None)
-    sentence = f"{_both_sides(str(rows[0]['persona']), ego, non_ego)}: {MEANINGS[label]}."
+    sentence = f"{both_sides(str(rows[0]['persona']), ego, non_ego)}: {MEANINGS[label]}."
     harmful = non_ego is not None and non_ego["failure_difference_low"] > 0
     return Answer(
         question=QUESTION,
@@ -109,7 +118,7 @@ def _of_pair(rows: Sequence[Row]) -> Answer:
         label=label,
         tone="harm" if harmful else "open",  # "not refuted" is no yes
         sentence=sentence[0].upper() + sentence[1:] + "".join(map(left_out, rows)),
-        speed="" if non_ego is None else _induced_failures(non_ego),
+        speed="" if non_ego is None else induced_failures(non_ego),
     )
 
 
@@ -117,68 +126,6 @@ def _label(verdicts: Sequence[GapVerdict], both: bool) -> str:
     if GapVerdict.DISTINGUISHABLE in verdicts:
         return NO
     return NEAR if both and NOTHING_TO_GAIN.issuperset(verdicts) else OPEN
-
-
-def _both_sides(persona: str, ego: Row | None, non_ego: Row | None) -> str:
-    driver = f"the {persona} driver"
-    gains = [each for each in (ego, non_ego) if each is not None and each["verdict"] == GapVerdict.DISTINGUISHABLE]
-    if non_ego is not None and [math.isfinite(each["gap_share"]) for each in gains] == [True, True]:
-        return f"{_side('the ego', ego)}; {driver} {_share(non_ego)}"
-    return f"{_side('the ego', ego)}; {_side(driver, non_ego)}"
-
-
-def _induced_failures(row: Row) -> str:
-    """How often the ego fails against a persona that was newly trained against it."""
-    games, rate = row["pairs"], row["ego_failure_rate_best_response"]
-    if not games:
-        return f"The effect of a {row['persona']} driver newly trained against this ego was not measured."
-    span = sure(row["ego_failure_rate_best_response_low"], row["ego_failure_rate_best_response_high"])
-    counts = f"{round(rate * games)} of {games} games ({percent(rate)}; {span})"
-    text = f"{_newly_trained(str(row['persona']))} {counts} instead of {round(row['ego_failure_rate'] * games)}"
-    if GapVerdict(row["verdict"]) is GapVerdict.NONE_FOUND:
-        return f"{text}, but this driver does not earn more by it."
-    return f"{text}."
-
-
-def _newly_trained(persona: str) -> str:
-    return f"A {persona} driver newly trained against this ego makes it fail in"
-
-
-def _side(player: str, row: Row | None) -> str:
-    if row is None:
-        return f"no best response of {player} was trained"
-    match GapVerdict(row["verdict"]):
-        case GapVerdict.DISTINGUISHABLE:
-            return f"{player} could still gain {_share(row)} of its payoff"
-        case GapVerdict.BEFORE_HOLM_ONLY:
-            holm = f"but not after Holm's correction ({p_text(row['p_holm'])})"
-            return f"{player} might gain {_share(row)} of its payoff, {holm}"
-        case GapVerdict.NOT_DISTINGUISHABLE:
-            measured = f"for {player} a gain of {_share(row)} was measured"
-            return f"{measured}, which is not distinguishable from 0{_span(row)}"
-        case GapVerdict.NONE_FOUND:
-            return f"for {player} nothing better was found"
-        case GapVerdict.NO_DIFFERENCE:
-            return f"the best response of {player} earns the same in every game"
-        case GapVerdict.ALL_EQUAL:
-            return f"{player} gains {_share(row)} of its payoff, the same in every game: there is no test"
-        case _:
-            return f"for {player} too few games could be compared"
-
-
-def _share(row: Row) -> str:
-    """The gap as a share of the payoff; where the payoff is 0, the gap itself."""
-    if math.isfinite(row["gap_share"]):
-        return percent(row["gap_share"])
-    return f"{number(row['gap'], 2)} above the 0"
-
-
-def _span(row: Row) -> str:
-    """The gap's interval as shares of the payoff; empty where there is none."""
-    if not (row["payoff"] and math.isfinite(row["ci_low"])):
-        return ""
-    low, high = (signed(row[end] / abs(row["payoff"]) * 100, 1) for end in ("ci_low", "ci_high"))
-    return f" ({SURE}: {low} to {high}{NO_SPACE}%)"
 
 
 def _of_pairs(persona: str, pairs: Sequence[Sequence[Row]]) -> Answer:
@@ -198,7 +145,9 @@ def _of_pairs(persona: str, pairs: Sequence[Sequence[Row]]) -> Answer:
     sentence = "; ".join(
         f"in {count} of {several} {unit} {findings[label]}" for label, count in counts.items() if count
     )
-    headline = next((label for label in (NO, NEAR, OPEN) if counts[label]), NOT_ANSWERED)
+    # "not refuted" is no headline beside a pair of which a search lacks power
+    weak = GapVerdict.LACKS_POWER in [row["verdict"] for rows in pairs for row in rows]
+    headline = next((label for label in ((NO, OPEN) if weak else (NO, NEAR, OPEN)) if counts[label]), NOT_ANSWERED)
     measured = [row for rows in pairs for row in rows if not row["reason"] and row["pairs"]]
     responders = [row for row in measured if row["role"] == "non_ego"]
     return Answer(
@@ -206,18 +155,9 @@ def _of_pairs(persona: str, pairs: Sequence[Sequence[Row]]) -> Answer:
         label=headline if headline in (OPEN, NOT_ANSWERED) else f"{headline} in {counts[headline]} of {several} {unit}",
         tone="harm" if "harm" in [answer.tone for answer in answers] else "open",
         sentence=f"{sentence[0].upper()}{sentence[1:]}.",
-        speed=_induced_in_several(persona, responders, unit),
+        speed=induced_in_several(persona, responders, unit),
         per_seed=answers,
     )
-
-
-def _induced_in_several(persona: str, responders: Sequence[Row], unit: str) -> str:
-    if not responders:
-        return ""
-    rates = [row["ego_failure_rate_best_response"] for row in responders]
-    before = sum(row["ego_failure_rate"] for row in responders) / len(rates)
-    text = f"{_newly_trained(persona)} {percent(sum(rates) / len(rates))} of games "
-    return f"{text}(mean of {len(rates)} {unit}: {interval(min(rates), max(rates))}) instead of {percent(before)}."
 
 
 def equilibrium_sentences(equilibria: pd.DataFrame) -> list[tuple[int, str, list[str]]]:
@@ -237,10 +177,8 @@ def _solution(game: str, rows: pd.DataFrame) -> str:
     first = solved[solved["number"] == 1].to_dict("records")
     sides = {role: _mixture([row for row in first if row["role"] == role]) for role in ("ego", "non_ego")}
     rate = percent(first[0]["solution_failure_rate"])
-    text = (
-        f"In equilibrium the ego plays {sides['ego']}, the {game} driver {sides['non_ego']}: the ego fails in {rate} "
-    )
-    text += f"of games and earns {number(first[0]['solution_payoff'], 2)}."
+    text = f"In equilibrium the ego plays {sides['ego']}, the {game} driver {sides['non_ego']}: the ego fails in {rate}"
+    text += f" of games{_held_out(first[0])} and earns {number(first[0]['solution_payoff'], 2)}."
     more = int(solved["number"].max()) - 1
     return text + (f" {more} more {'is' if more == 1 else 'are'} in the table." if more else "")
 
@@ -251,10 +189,15 @@ def _safest(rows: Sequence[Row]) -> str:
     worst = [row["player"] for row in rows if row["role"] == "non_ego" and row["failure_rate"] >= most - 1e-6]
     best = min(egos, key=lambda row: row["failure_rate"])
     text = f"The safest choice of egos is {_mixture(egos)}: in the worst case it fails in {percent(most)} of games"
-    text += f" (against {', '.join(worst)})." if most > 0 else "."
+    text += _held_out(egos[0]) + (f", against {', '.join(worst)}." if most > 0 else ".")
     if sum(row["share"] > 0 for row in egos) > 1:
         text += f" The safest single ego is {best['player']}, with {percent(best['failure_rate'])} in the worst case."
     return text
+
+
+def _held_out(row: Row) -> str:
+    rate = row["held_out_failure_rate"]
+    return f" ({percent(rate)} in games that did not choose it)" if math.isfinite(rate) else ""
 
 
 def _mixture(rows: Sequence[Row]) -> str:

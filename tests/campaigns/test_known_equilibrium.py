@@ -36,13 +36,8 @@ from harness.drivers.car import car_of
 from harness.drivers.mixture import Member, Mixture, mixture_of
 from harness.drivers.policy_file import LearnedDriver, Policy, write_policy
 from harness.drivers.protocol import Driver
-from harness.evaluation.game_theory.best_response_gap import (
-    NOTHING_TO_GAIN,
-    GapVerdict,
-    Response,
-    gaps,
-    nothing_to_gain,
-)
+from harness.evaluation.game_theory.best_response_gap import NOTHING_TO_GAIN, Response, gaps, nothing_to_gain
+from harness.evaluation.gap_verdict import GapVerdict
 from harness.evaluation.tables import table_of
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.human_factors import HumanFactors
@@ -300,7 +295,7 @@ def gaps_of(matrix: Matrix, arm: str) -> pd.DataFrame:
 def test_gap__at_an_equilibrium_there_is_none(role: str, matrix: Matrix) -> None:
     row = gaps_of(matrix, EQUILIBRIUM).loc[role]
     won = matrix.payoffs(f"{EQUILIBRIUM}_{role}_response", role) - matrix.payoffs(EQUILIBRIUM, role)
-    assert row["pairs"] == 20
+    assert (row["pairs"], row["known"]) == (20, 2)
     assert won.max() <= 1e-9  # whatever was learned
     assert GapVerdict(row["verdict"]) in NOTHING_TO_GAIN
     assert row["gap"] == 0.0 if np.isnan(row["ci_low"]) else row["ci_low"] <= 0.0 <= row["ci_high"]
@@ -317,10 +312,11 @@ def test_gap__away_from_one_it_is_what_the_formula_says(arm: str, role: str, mat
     ahead, faster = all_starts()
     in_all = WEIGHTS[role] * (by_hand(ahead, faster, *better) - by_hand(ahead, faster, both, both)).mean()
     assert GapVerdict(row["verdict"]) == GapVerdict.DISTINGUISHABLE
-    assert row["gap"] == pytest.approx(won.mean())
-    assert row["ci_low"] < in_all
+    assert row["gap"] == pytest.approx(in_these)  # the other strategy of the campaign is the best response
+    assert row["ci_low"] < in_all < row["ci_high"]
+    assert row["search_gap"] == pytest.approx(won.mean())
     assert (won <= WEIGHTS[role] * (matrix.by_hand(*better) - matrix.by_hand(both, both)) + 1e-9).all()
-    assert row["gap"] > FOUND * in_these
+    assert row["search_gap"] > FOUND * in_these
 
 
 @pytest.mark.slow
@@ -372,6 +368,8 @@ class Coin:
             response_arm="response",
             ego="coin",
             non_ego="coin",
+            search_steps=600_000,
+            search_starts=2,
         )
         answer = mixture_of(response, self.personas[EGO])
         episodes = pd.concat([self.games("pair", self.player), self.games("response", answer)], ignore_index=True)

@@ -7,6 +7,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from harness.evaluation.tables import write_csv
+from tests.support.game_tables import findings
 from tests.support.repository import REPOSITORY
 from tests.support.scripts import script
 
@@ -37,3 +39,13 @@ def test_failures__a_cell_is_the_mean_over_seeds_and_a_dash_without_games() -> N
 def test_page__shows_the_output_of_the_script(table: str, source: Path, name: str) -> None:
     page = (REPOSITORY / "docs" / "game.md").read_text(encoding="utf-8")
     assert getattr(figures, table)(figures.read(source, name)) in page
+
+
+def test_gaps__of_a_run_of_now_are_those_of_its_table(tmp_path: Path) -> None:
+    found = findings(games=20).gaps
+    write_csv(found, tmp_path / "gaps.csv")
+    lines = figures.gaps_table(figures.read(tmp_path, "gaps")).splitlines()
+    assert len(lines) == 2 + len(found)
+    ego = found[(found["persona"] == "distracted") & (found["role"] == "ego")].iloc[0]
+    payoffs = f"{ego['payoff']:.2f} → {ego['payoff_best_response']:.2f}"
+    assert f"| `retrained_distracted` against `distracted`: ego | 1 | {payoffs} |" in lines[2]

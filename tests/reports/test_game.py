@@ -10,24 +10,14 @@ import pandas as pd
 import pytest
 
 from harness.evaluation.column import POINTS, SHARE
-from harness.evaluation.game_theory.best_response_gap import GapVerdict, Response, gaps
 from harness.evaluation.game_theory.empirical_game import equilibria
 from harness.evaluation.tables import columns_of, table_of, write_csv
-from harness.reports.game import (
-    CAPTIONS,
-    MEANINGS,
-    NEAR,
-    NO,
-    OPEN,
-    equilibrium_sentences,
-    game_section,
-    gap_verdicts,
-)
+from harness.reports.game import CAPTIONS, equilibrium_sentences, game_section
 from harness.reports.game_links import GameLinks
 from harness.reports.heatmaps import OPENS_A_GAME, views
 from tests.support.chromium import COLOURS, contrast, rgb, unfold
-from tests.support.game_tables import arm, findings, table
-from tests.support.pages import Page, campaign, rendered
+from tests.support.game_tables import findings
+from tests.support.pages import Page, campaign, plain, rendered
 
 NO_LINKS = GameLinks(embedded=(), episodes=table_of("episodes"))
 
@@ -51,10 +41,6 @@ def html(found):
 @pytest.fixture(scope="module")
 def page(html):
     return Page(html)
-
-
-def plain(text):
-    return text.replace("\N{NO-BREAK SPACE}", " ")
 
 
 # --- numbers ---
@@ -134,107 +120,6 @@ def test_section__is_there_only_where_a_run_has_such_tables(html):
 
 # --- words ---
 
-EGO, NON_EGO = (
-    Response(
-        seed=1,
-        role=role,
-        persona="speedy",
-        round=3,
-        pair_arm="pair",
-        response_arm=f"best_{role}",
-        ego="retrained_speedy",
-        non_ego="speedy",
-    )
-    for role in ("ego", "non_ego")
-)
-
-
-def verdict_texts(ego_gain, non_ego_gain, responses=(EGO, NON_EGO), failing=0, games=100):
-    """The verdict on a pair of which the ego earns 10, the speedy driver 20; gains alternate a little around a mean."""
-    wave = [0.01 * (-1) ** place for place in range(games)]
-
-    def arm_of(name, ego=0.0, non_ego=0.0, failed=0):
-        sides = (
-            [10 + (each + ego if ego else 0) for each in wave],
-            [20 + (each + non_ego if non_ego else 0) for each in wave],
-        )
-        return arm(name, 1, [1] * failed + [0] * (games - failed), *sides)
-
-    episodes = table(
-        arm_of("pair", failed=3), arm_of("best_ego", ego_gain), arm_of("best_non_ego", 0, non_ego_gain, failing)
-    )
-    ((persona, verdict),) = gap_verdicts(gaps(responses, episodes, 0.01))
-    assert persona == "speedy"
-    return verdict.label, plain(verdict.sentence), plain(verdict.speed), verdict.tone
-
-
-FAILS = "A speedy driver newly trained against this ego makes it fail in 12 of 100 games (12 %; 95 %: 6.4–20 %) instead"
-
-
-@pytest.mark.parametrize(
-    ("gains", "given", "label", "sentence", "induced", "tone"),
-    [
-        (
-            (0.2, 6.2),
-            {"failing": 12},
-            "no",
-            f"The ego could still gain 2 % of its payoff; the speedy driver 31 %: {MEANINGS[NO]}.",
-            f"{FAILS} of 3.",
-            "harm",
-        ),
-        (
-            (-0.2, -0.4),
-            {"failing": 12},
-            "not refuted",
-            f"For the ego nothing better was found; for the speedy driver nothing better was found: {MEANINGS[NEAR]}.",
-            f"{FAILS} of 3, but this driver does not earn more by it.",
-            "harm",  # the ego fails more, whatever for
-        ),
-        (
-            (-0.2, 0),
-            {"responses": (EGO,)},
-            "not decided",
-            "For the ego nothing better was found; no best response of the speedy driver was trained: "
-            f"{MEANINGS[OPEN]}.",
-            "",
-            "open",
-        ),
-    ],
-)
-def test_words__of_gains(gains, given, label, sentence, induced, tone):
-    assert verdict_texts(*gains, **given) == (label, sentence, induced, tone)
-
-
-def test_words__a_gain_not_distinguishable_from_0_has_its_interval():
-    row = gaps([EGO, NON_EGO], table(arm("pair", ego_failed=[0, 0])), 0.01)
-    row = row.assign(verdict=GapVerdict.NOT_DISTINGUISHABLE.value, payoff=-20.0, gap=6.0, gap_share=0.3)
-    ((_, answer),) = gap_verdicts(row.assign(ci_low=-1.0, ci_high=13.0))
-    assert answer.tone == "open"  # nothing is shown, neither way
-    assert plain(answer.sentence).startswith(
-        "For the ego a gain of 30 % was measured, which is not distinguishable from 0 (95 %: −5 to 65 %); "
-        "for the speedy driver"
-    )
-
-
-@pytest.mark.parametrize("verdict", list(GapVerdict))
-def test_words__state_a_gain_only_where_it_is_distinguishable_from_0(verdict):
-    row = gaps([EGO, NON_EGO], table(arm("pair", ego_failed=[0, 0])), 0.01)
-    reason = "the speedy driver can't drive this scene" if verdict is GapVerdict.NOT_ANSWERED else ""
-    row = row.assign(verdict=verdict.value, gap_share=0.1, gap=1.0, p_holm=0.2, reason=reason)
-    ((_, answer),) = gap_verdicts(row)
-    assert ("could still gain" in answer.sentence) == (verdict is GapVerdict.DISTINGUISHABLE)
-    assert (answer.label == "no") == (verdict is GapVerdict.DISTINGUISHABLE)
-    assert answer.sentence.endswith(".") or "left out" in answer.sentence
-
-
-def test_words__games_that_could_not_be_compared_are_counted_not_rated():
-    episodes = table(arm("pair", ego_failed=[0, 0]), arm("best_ego", ego_failed=[None, 0]))
-    ((_, verdict),) = gap_verdicts(gaps([EGO, NON_EGO], episodes, 0.01))
-    assert verdict.label == "not decided"
-    assert "1 of 2 pairs is left out: not played or not measured." in verdict.sentence
-    assert verdict.speed == "The effect of a speedy driver newly trained against this ego was not measured."
-    assert "%" not in verdict.sentence
-
 
 def test_words__of_an_equilibrium_name_shares_failures_and_payoff():
     cells = pd.DataFrame(
@@ -248,15 +133,22 @@ def test_words__of_an_equilibrium_name_shares_failures_and_payoff():
             "non_ego_payoff": [-1.0, 1.0, 1.0, -1.0],
         }
     )
-    (_, against, (nash,)), (_, everyone, (safest,)) = equilibrium_sentences(equilibria(cells))
+    found = equilibria(cells)
+    (_, against, (nash,)), (_, everyone, (safest,)) = equilibrium_sentences(found)
     assert (against, everyone) == ("speedy", "all")
     assert plain(nash) == (
         "In equilibrium the ego plays 50 % naive + 50 % retrained, the speedy driver 50 % speedy + 50 % "
         "speedy_round2: the ego fails in 15 % of games and earns 0.00."
     )
     assert plain(safest) == (
+        "The safest choice of egos is 33.3 % naive + 66.7 % retrained: in the worst case it fails in 13.3 % of games, "
+        "against speedy, speedy_round2. The safest single ego is retrained, with 20 % in the worst case."
+    )
+    (_, _, (nash,)), (_, _, (safest,)) = equilibrium_sentences(found.assign(held_out_failure_rate=0.2))
+    assert "the ego fails in 15 % of games (20 % in games that did not choose it) and earns 0.00." in plain(nash)
+    assert plain(safest).startswith(
         "The safest choice of egos is 33.3 % naive + 66.7 % retrained: in the worst case it fails in 13.3 % of games "
-        "(against speedy, speedy_round2). The safest single ego is retrained, with 20 % in the worst case."
+        "(20 % in games that did not choose it), against speedy, speedy_round2."
     )
 
 

@@ -137,6 +137,8 @@ def a_campaign(
                     response_arm=best["arm"][0],
                     ego=ego,
                     non_ego=non_ego,
+                    search_steps=600_000,
+                    search_starts=2,
                 )
             )
     return table(*arms), pairings, responses

@@ -200,6 +200,11 @@ def _training_stage(seed: int) -> dict[str, Any]:
     return {"kind": "training", "seed": seed, "status": "done", "seconds": 3725.0, "message": ""} | trained
 
 
+def plain(text: str) -> str:
+    """A sentence of a page with ordinary spaces."""
+    return text.replace("\N{NO-BREAK SPACE}", " ")
+
+
 class Page(HTMLParser):
     """What a test asks of a page: its text, its tables by id, every tag with its attributes."""
 

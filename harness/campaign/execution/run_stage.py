@@ -2,8 +2,8 @@
 
 A stage is a function of its inputs alone, which `cache_keys` hashes: a stage that is done is skipped. Where an
 approximate equilibrium is reached, later stages have nothing to do: no player's best response gains anything
-distinguishable from 0. A pair of which a player can't drive the scene alone is in none: that no training found anything
-better shows nothing.
+distinguishable from 0. A pair of which a player can't drive the scene alone is in none, nor is one of which a search
+lacks power: that no training found anything better shows nothing.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from harness.campaign.plan.stages import (
     TrainingStage,
 )
 from harness.campaign.storage.run_folder import RunFolder
+from harness.config.campaign import Campaign
 from harness.road.scene.open_scene import OpenScene, open_scene
 
 
@@ -44,7 +45,7 @@ def _carry_out_stage(stage: Stage, run: StageRun) -> dict[str, Any]:
     context, key, started_s = run.context, run.context.keys[stage.id], time.monotonic()
     folder = context.folder
     folder.begin(stage.id, key)
-    gate = equilibrium_before(stage, folder, context.document.assessment.significance)
+    gate = equilibrium_before(stage, folder, context.document)
     if gate is not None:
         message = f"not needed: {gate.pair} is an approximate equilibrium"
         settled: dict[str, Any] = {"settled": gate.pair, "message": message}
@@ -85,9 +86,15 @@ def _make(stage: Stage, run: StageRun, scene: OpenScene) -> tuple[dict[str, Any]
             return carry_out_preventability(stage, run, scene)
 
 
-def equilibrium_before(stage: Stage, folder: RunFolder, significance: float) -> EquilibriumGate | None:
-    """The first gate of a stage whose pair is an approximate equilibrium; None if the stage has to be carried out."""
+def equilibrium_before(stage: Stage, folder: RunFolder, campaign: Campaign) -> EquilibriumGate | None:
+    """The first gate of a stage whose pair is an approximate equilibrium; None if the stage has to be carried out.
+
+    The searched best responses alone decide. The campaign's other strategies, which count in `gaps.csv`, may be made
+    later than this stage: by them the result would depend on the order of the stages.
+    """
+    search = campaign.best_response
     for gate in stage.gates:
+        assert search is not None, "only a campaign with best responses has gates"
         import pandas as pd  # slow to import, and few stages have gates
 
         from harness.campaign.storage.arm_tables import arm_tables
@@ -106,10 +113,12 @@ def equilibrium_before(stage: Stage, folder: RunFolder, significance: float) -> 
                 response_arm=arm,
                 ego="",
                 non_ego="",
+                search_steps=search.steps,
+                search_starts=search.starts,
                 alone=gate.bounds,
             )
             for role, arm in zip(roles, responses, strict=True)
         ]
-        if nothing_to_gain(gaps(asked, episodes, significance)):
+        if nothing_to_gain(gaps(asked, episodes, campaign.assessment.significance)):
             return gate
     return None

@@ -12,7 +12,8 @@ Heinrich et al. 2015) |
 oracles: Lanctot et al. 2017) |
 
 With `[best_response]` the rounds of a persona end early, when neither player's best response gains anything
-distinguishable from 0 (`execution.run_stage`): the later stages have nothing to do.
+distinguishable from 0, after searches that do not lack power (`execution.run_stage`): the later stages have nothing to
+do.
 
 A best response (equation 2 of the paper) tells how much a player can gain by changing its strategy alone. For an arm,
 each player in turn learns again against the other player, which stays fixed, from several starts: first from its own

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from harness.campaign.plan.alone_bounds import alone_bounds
 from harness.campaign.plan.plan import plan
@@ -16,9 +16,11 @@ from harness.evaluation.strategies import (
     Arm,
     EgoStrategy,
     NonEgoStrategy,
+    PersonaNonEgo,
     ReconfiguredEgo,
     RetrainedEgo,
     RobustEgo,
+    SumoNonEgo,
     round_of,
     strategy_name,
 )
@@ -75,10 +77,10 @@ def _pair(arm: Arm) -> tuple[EgoStrategy, NonEgoStrategy]:
 def _responses(campaign: Campaign, stages: Sequence[AssessmentStage]) -> list[Response]:
     """The arms in which a best response replaces a player, of pairs that are done too."""
     done = {(stage.arm, stage.seed) for stage in stages}
-    found = []
+    search, found = campaign.best_response, []
     for stage in stages:
         arm = stage.arm
-        if arm.best_response_of is None or (arm.pair, stage.seed) not in done:
+        if search is None or arm.best_response_of is None or (arm.pair, stage.seed) not in done:
             continue
         ego, non_ego = _pair(arm)
         found.append(
@@ -91,10 +93,39 @@ def _responses(campaign: Campaign, stages: Sequence[AssessmentStage]) -> list[Re
                 response_arm=stage.name,
                 ego=strategy_name(ego),
                 non_ego=strategy_name(non_ego),
+                search_steps=search.steps,
+                search_starts=search.starts,
+                known_arms=_known_arms(stage, stages),
                 alone=alone_bounds(campaign, arm.pair),
             )
         )
     return found
+
+
+def _known_arms(response: AssessmentStage, stages: Sequence[AssessmentStage]) -> dict[str, str]:
+    """By the name of another strategy of the player that the response replaces: the arm in which it meets the same
+    other player, with the same payoff. A best response is named after its arm."""
+    learner, pair = response.arm.best_response_of, _pair(response.arm)
+    assert learner is not None
+    own, other = pair[learner], pair[1 - learner]
+    known = {}
+    for stage in stages:
+        arm = stage.arm
+        if stage.seed != response.seed or not all(stage.sides) or arm.best_response_of not in (None, learner):
+            continue
+        strategy, met = _pair(arm)[learner], _pair(arm)[1 - learner]
+        if met == other and strategy != own and _same_payoff(strategy, own):
+            known[strategy_name(strategy) if arm.best_response_of is None else arm.name] = arm.name
+    return known
+
+
+def _same_payoff(one: EgoStrategy | NonEgoStrategy, other: EgoStrategy | NonEgoStrategy) -> bool:
+    """Whether two strategies of a player have one payoff: those of egos, or of one person in several rounds."""
+    match one, other:
+        case PersonaNonEgo(round=round_), PersonaNonEgo():
+            return one == replace(other, round=round_)
+        case _:
+            return SumoNonEgo() not in (one, other)
 
 
 def _training_personas(campaign: Campaign, stages: Sequence[AssessmentStage]) -> dict[str, list[str]]:

@@ -20,6 +20,7 @@ from harness.evaluation.comparisons.comparison import games_by_arm, mean_interva
 from harness.evaluation.comparisons.harm_clauses import Beside, harm_clauses
 from harness.evaluation.comparisons.near_misses import by_criterion
 from harness.evaluation.comparisons.preventability import by_regulation
+from harness.evaluation.gap_verdict import GapVerdict
 from harness.evaluation.strategies import (
     Arm,
     EgoStrategy,
@@ -34,6 +35,8 @@ from harness.evaluation.strategies import (
 )
 
 JudgedEgo = Literal["last", "robust", "naive"]
+LACKS_POWER = "the search ends below the ego's own strategy"
+"""Why a gap that was measured bounds nothing."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -239,6 +242,8 @@ def _gap_shares(subject: Subject, evidence: Evidence) -> Iterator[Measured]:
         if (row["role"], row["ego"], row["persona"], row["seed"]) == ("ego", ego, subject.persona, subject.seed):
             scale, found = abs(row["payoff"]) or np.nan, True
             high = row["ci_high"] if np.isfinite(row["ci_high"]) else row["gap"]
-            yield Measured(f"{ego}_vs_{row['non_ego']}", row["gap"] / scale, high / scale, row["pairs"])
+            measured = Measured(f"{ego}_vs_{row['non_ego']}", row["gap"] / scale, high / scale, row["pairs"])
+            lacks_power = row["verdict"] == GapVerdict.LACKS_POWER
+            yield measured._replace(limit=np.nan, detail=LACKS_POWER) if lacks_power else measured
     if not found:
         yield Measured(against_persona(subject.ego, subject.persona).name, np.nan, np.nan, 0)

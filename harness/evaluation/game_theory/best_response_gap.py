@@ -1,15 +1,18 @@
 """The best-response gap (exploitability): a player's gain by a change of its strategy alone (SafeDriveRL, equation 2).
 
 For each response, games are paired by seed and episode: the pair's game against the same game with one player
-replaced by its best response. The gap is the mean difference of that player's payoff. It is a lower bound: a better
-response may exist, so a gap that is not distinguishable from 0 does not prove an equilibrium.
+replaced by its best known response. The gap is the mean difference of that player's payoff. It is a lower bound: a
+better response may exist, so a gap that is not distinguishable from 0 does not prove an equilibrium.
+
+The known responses are the one that the search trained, and the campaign's other strategies of this player that met the
+same other player. The best of several means is too high on average. Therefore the choice is cross-fitted: for the games
+of even episodes the response with the highest mean payoff in the odd ones is taken, and the reverse.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from enum import Enum
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -19,14 +22,20 @@ from harness.evaluation.comparisons.comparison import (
     games_by_arm,
     holm,
     mean_cells,
+    measured_values,
     paired_t_test,
-    pairs_of,
     rate_cells,
 )
 from harness.evaluation.competence import AloneBound, gate
+from harness.evaluation.gap_verdict import GapVerdict
 from harness.evaluation.tables import table_of, typed
+from harness.game.arrays import FloatArray, IntArray
 
 Role = Literal["ego", "non_ego"]
+SEARCH = "the search"
+"""The response that the search trained, in the column `best_known`. No strategy has a space in its name."""
+LEAST_OF_HALF = 2
+"""Fewer games in a half choose no response: only the search counts."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,39 +51,26 @@ class Response:
     response_arm: str
     ego: str
     non_ego: str
+    search_steps: int
+    """The budget of each training."""
+    search_starts: int
+    """The trainings."""
+    known_arms: Mapping[str, str] = field(default_factory=dict)
+    """By the name of another strategy of this player: the arm in which it meets the same other player."""
     alone: tuple[AloneBound, ...] = ()
     """What the players of the pair have to achieve alone; otherwise there is no verdict on them."""
 
 
-class GapVerdict(str, Enum):
-    """Every value the column `verdict` can have."""
-
-    DISTINGUISHABLE = "distinguishable from 0"
-    """p_holm < significance: this player could gain."""
-    BEFORE_HOLM_ONLY = "distinguishable from 0 before Holm's correction only"
-    NOT_DISTINGUISHABLE = "not distinguishable from 0"
-    """The best response earned more, but not significantly."""
-    NONE_FOUND = "no better response found"
-    """The best response earned less or the same on average: the training found nothing better than the player's own
-    strategy. A negative gap is not a gain."""
-    NO_DIFFERENCE = "no difference"
-    """Every game has the same payoff with and without the best response."""
-    ALL_EQUAL = "no t statistic: all differences equal"
-    """The best response earned more by the same number in every game."""
-    NOT_ENOUGH_PAIRS = "not enough pairs"
-    NOT_ANSWERED = "not answered: the pair was not shown to drive this scene"
-    """A player of the pair misses a bound of `Response.alone`, so there is no test."""
-
-
 NOTHING_TO_GAIN = frozenset({GapVerdict.NOT_DISTINGUISHABLE, GapVerdict.NONE_FOUND, GapVerdict.NO_DIFFERENCE})
-"""The verdicts on a player without a distinguishable gain."""
+"""The verdicts on a player without a distinguishable gain, after a search that did not end below its own strategy."""
 
 
 def gaps(responses: Iterable[Response], episodes: pd.DataFrame, significance: float) -> pd.DataFrame:
     """A row for each response, in their order, the table `gaps`.
 
-    `episodes` has the columns of episodes.csv. A pair is left out, and counted, when either game errored, is missing,
-    or lacks the payoff or the ego's outcome. A value that can't be computed is NaN; where all differences are equal
+    `episodes` has the columns of episodes.csv. A pair is left out, and counted, when its game, or that of a response,
+    errored, is missing, or lacks the payoff or the ego's outcome. A strategy without any such game is no response. A
+    value that can't be computed is NaN; where all differences are equal
     there is no test, as in `comparisons.comparison`. Holm's correction is over all rows of this table.
     There is no test either where a player of the pair misses a bound of `Response.alone`.
 
@@ -91,27 +87,63 @@ def nothing_to_gain(found: pd.DataFrame) -> bool:
     """Whether a best response of both sides was trained and neither gap is distinguishable from 0.
 
     `found` is a table of `gaps`, e.g. of the last round: this is the rule by which rounds stop early. It is false for a
-    gap that is distinguishable before Holm's correction only, or that has no test.
+    gap that is distinguishable before Holm's correction only, or that has no test, and after a search that lacks power.
     """
     both_sides = set(found["role"]) == {"ego", "non_ego"}
     return both_sides and all(GapVerdict(verdict) in NOTHING_TO_GAIN for verdict in found["verdict"])
 
 
 def _row(response: Response, games: Mapping[Any, pd.DataFrame]) -> dict[str, object]:
-    columns = [f"{response.role}_payoff", "ego_failed"]
-    pair, best, left_out = pairs_of(games, response.seed, response.pair_arm, response.response_arm, columns)
+    known, left_out, (pair, *responses), episodes = _compared(response, games)
     closed = gate(response.alone, response.seed, games)
-    row = vars(response) | closed | {"pairs": len(pair), "pairs_left_out": left_out}
+    row = vars(response) | closed | {"pairs": len(pair), "pairs_left_out": left_out, "known": len(known)}
     if not len(pair):
         return row
+    taken = _cross_fitted(np.stack([each[:, 0] for each in responses]), episodes)
+    search, best = responses[0], np.stack(responses)[taken, np.arange(len(pair))]
     payoff = float(pair[:, 0].mean())
     test = paired_t_test(pair[:, 0], best[:, 0], closed)
     row |= test | {"payoff": payoff, "payoff_best_response": best[:, 0].mean(), "gap": test["mean_difference"]}
+    row["best_known"] = " + ".join([SEARCH, *known][place] for place in sorted(set(taken.tolist())))
     if payoff != 0:
         row["gap_share"] = test["mean_difference"] / abs(payoff)
+    of_search = paired_t_test(pair[:, 0], search[:, 0], closed)
+    names = {"search_gap": "mean_difference", "search_gap_low": "ci_low", "search_gap_high": "ci_high"}
+    row |= {name: of_search.get(cell, np.nan) for name, cell in names.items()}
     row |= rate_cells("ego_failure_rate", pair[:, 1].sum(), len(pair))
     row |= rate_cells("ego_failure_rate_best_response", best[:, 1].sum(), len(best))
     return row | mean_cells("failure_difference", best[:, 1] - pair[:, 1])
+
+
+def _compared(
+    response: Response, games: Mapping[Any, pd.DataFrame]
+) -> tuple[Sequence[str], int, Sequence[FloatArray], IntArray]:
+    """The known strategies that count, the number of games left out, and of the N games that are compared: payoff and
+    the ego's failure in the pair, with the search and with each known strategy [N, 2], and the episodes [N]."""
+    columns = [f"{response.role}_payoff", "ego_failed"]
+
+    def measured(arm: str) -> pd.DataFrame:
+        values = measured_values(games.get((arm, response.seed)), columns)
+        return values.where(np.isfinite(values))
+
+    both = [measured(response.pair_arm), measured(response.response_arm)]
+    known = {name: values for name, arm in response.known_arms.items() if len((values := measured(arm)).dropna())}
+    table = pd.concat([*both, *known.values()], axis=1)
+    of_half = np.bincount(table.dropna().index.to_numpy(dtype=np.int64) % 2, minlength=2)
+    if of_half.min() < LEAST_OF_HALF:
+        known, table = {}, pd.concat(both, axis=1)
+    complete = table.dropna()
+    values = np.split(complete.to_numpy(dtype=np.float64), 2 + len(known), axis=1)
+    return list(known), len(table) - len(complete), values, complete.index.to_numpy(dtype=np.int64)
+
+
+def _cross_fitted(payoffs: FloatArray, episodes: IntArray) -> IntArray:
+    """For each of N games the place of the response to take: that of the highest mean payoff, of [K, N], in the other
+    half of the games. Of equal ones the first."""
+    if len(payoffs) == 1:
+        return np.zeros(len(episodes), dtype=np.int64)
+    of_even, of_odd = (payoffs[:, episodes % 2 == half].mean(axis=1).argmax() for half in (0, 1))
+    return np.where(episodes % 2 == 0, of_odd, of_even)
 
 
 def _verdict(row: Mapping[Any, Any], significance: float) -> GapVerdict:
@@ -119,12 +151,14 @@ def _verdict(row: Mapping[Any, Any], significance: float) -> GapVerdict:
         return GapVerdict.NOT_ANSWERED
     if row["pairs"] < 2:
         return GapVerdict.NOT_ENOUGH_PAIRS
-    if np.isnan(row["p_value"]) and row["gap"] == 0:
-        return GapVerdict.NO_DIFFERENCE
-    if row["gap"] <= 0:
-        return GapVerdict.NONE_FOUND
-    if np.isnan(row["p_value"]):
-        return GapVerdict.ALL_EQUAL
     if row["p_holm"] < significance:
         return GapVerdict.DISTINGUISHABLE
-    return GapVerdict.BEFORE_HOLM_ONLY if row["p_value"] < significance else GapVerdict.NOT_DISTINGUISHABLE
+    if row["p_value"] < significance:
+        return GapVerdict.BEFORE_HOLM_ONLY
+    if np.isnan(row["p_value"]) and row["gap"] > 0:
+        return GapVerdict.ALL_EQUAL
+    if row["search_gap"] < 0 and not row["search_gap_high"] >= 0:  # NaN: less by the same number in every game
+        return GapVerdict.LACKS_POWER
+    if np.isnan(row["p_value"]) and row["gap"] == 0:
+        return GapVerdict.NO_DIFFERENCE
+    return GapVerdict.NOT_DISTINGUISHABLE if row["gap"] > 0 else GapVerdict.NONE_FOUND

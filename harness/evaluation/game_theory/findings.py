@@ -12,6 +12,7 @@ from harness.evaluation.competence import gate
 from harness.evaluation.game_theory.best_response_gap import Response, gaps
 from harness.evaluation.game_theory.crossplay import Pairing, crossplay, generalisation
 from harness.evaluation.game_theory.empirical_game import equilibria
+from harness.evaluation.game_theory.held_out import with_held_out_rates
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +53,7 @@ def find(
     return GameFindings(
         gaps=gaps(responses, episodes, significance),
         crossplay=cells,
-        equilibria=equilibria(cells),
+        equilibria=with_held_out_rates(equilibria(cells), pairings, episodes),
         generalisation=generalisation(trained_against, pairings, episodes, significance),
         cautions=[(seed, reason) for seed, reason in reasons if reason],
     )

@@ -14,6 +14,7 @@ from harness.campaign.storage.run_folder import RunFolder
 from harness.evaluation.competence import AloneBound
 from harness.evaluation.strategies import PersonaNonEgo
 from tests.support.game_tables import arm
+from tests.support.plans import campaign_of
 
 BOUND = AloneBound(player="ego", words="the retrained ego", arm="retrained_alone_anna", goal_share=0.97)
 GATE = EquilibriumGate(
@@ -43,4 +44,5 @@ def test_equilibrium__of_a_pair_that_cannot_drive_is_none(
         return SimpleNamespace(episodes=arm(stage.removesuffix("-seed1"), ego_failed=failed))
 
     monkeypatch.setattr("harness.campaign.storage.arm_tables.arm_tables", tables)
-    assert equilibrium_before(ROUND_3, RunFolder(tmp_path), 0.01) == (GATE if ends else None)
+    campaign = campaign_of("anna", best_response={})
+    assert equilibrium_before(ROUND_3, RunFolder(tmp_path), campaign) == (GATE if ends else None)

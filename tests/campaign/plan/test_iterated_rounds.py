@@ -1,4 +1,4 @@
-"""The plan after the paper's rounds: opponents, best responses, the cross-play, and the matchups that follow."""
+"""The plan after the paper's rounds: opponents, best responses, and the cross-play."""
 
 from __future__ import annotations
 
@@ -23,7 +23,6 @@ from harness.campaign.plan.stages import (
 )
 from harness.campaign.plan.strategy_stages import SeedStages, crossplay_name, training_settings
 from harness.campaign.preflight import open_campaign
-from harness.campaign.results.matchups import Matchups, matchups_of
 from harness.errors import UsageError
 from harness.game.roles import EGO, NON_EGO
 from tests.support.plans import campaign_of, planned, stages_of
@@ -37,11 +36,6 @@ BOTH = ("anna", "bert")
 
 def names_of(side: Side) -> list[str]:
     return [description(each).removesuffix("-seed1") for each in members_of(*side)]
-
-
-def matchups(*personas: str, tunable: bool = False, **changes: Any) -> Matchups | None:
-    ids = {f"{name}-seed1" for name in stages_of(*personas, tunable=tunable, **changes)}
-    return matchups_of(campaign_of(*personas, **changes), personas, ids, tunable)
 
 
 # --- rounds ---------------------------------------------------------------
@@ -206,54 +200,7 @@ def test_settings__several_people_in_one_place_multiply_the_budget() -> None:
         assert training_settings(campaign, stages[name]) == once  # of one person's strategies it meets one
 
 
-# --- all egos against all people ---------------------------------------------------------------
-
-
-def test_matchups__of_all_egos_against_all_people() -> None:
-    changes = {"crossplay": {"egos": ["sumo", "egos/adas.toml"]}, "retraining": {"against": ["anna"]}}
-    found = matchups(*BOTH, rounds={"count": 4}, **changes)
-    assert found is not None
-    egos = {"naive", "robust", "sumo", "adas"}
-    egos |= {f"retrained_{who}{round_}" for who in BOTH for round_ in ("", "_round4")}
-    non_egos = {f"{who}{round_}" for who in BOTH for round_ in ("", "_round3")}
-    assert {(each.ego, each.non_ego) for each in found.pairings} == {(ego, other) for ego in egos for other in non_egos}
-    assert found.training_personas["robust"] == ["anna"]
-    assert found.training_personas["retrained_bert_round4"] == ["bert"]
-
-
-@pytest.mark.parametrize(
-    ("driver", "tunable", "egos", "measured"),
-    [
-        ("sumo", False, {"naive", "adas"}, "naive_vs_anna"),
-        ("adas.toml", True, {"naive", "reconfigured_anna", "sumo"}, "reconfigured_vs_anna"),
-    ],
-)
-def test_matchups__of_an_external_ego_as_it_is_and_as_it_was_tuned(
-    driver: str, tunable: bool, egos: set[str], measured: str
-) -> None:
-    other = "sumo" if driver != "sumo" else "adas.toml"
-    changes = {"ego": {"driver": driver}, "crossplay": {"egos": [other]}, "best_response": RESPONSE}
-    found = matchups("anna", tunable=tunable, **changes)
-    assert found is not None
-    assert {each.ego for each in found.pairings} == egos
-    assert {each.pair_arm for each in found.responses} == {measured}
-
-
-def test_matchups__there_are_none_of_the_papers_rounds() -> None:
-    assert matchups(*BOTH) is None
-
-
-def test_matchups__a_response_has_the_pair_and_round_that_it_belongs_to() -> None:
-    found = matchups("anna", rounds={"count": 3}, best_response=RESPONSE)
-    assert found is not None
-    assert {(each.role, each.round, each.pair_arm, each.ego, each.non_ego) for each in found.responses} == {
-        (role, last, pair, "retrained_anna", non_ego)
-        for role in ("ego", "non_ego")
-        for last, pair, non_ego in (
-            (2, "retrained_vs_anna", "anna"),
-            (3, "retrained_anna_vs_anna_round3", "anna_round3"),
-        )
-    }
+# --- other egos ---------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

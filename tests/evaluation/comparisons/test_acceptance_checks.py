@@ -15,6 +15,7 @@ from harness.evaluation.comparisons.acceptance_checks import (
     worst_of_each,
 )
 from harness.evaluation.comparisons.summary import summarise
+from harness.evaluation.gap_verdict import GapVerdict
 from harness.evaluation.strategies import (
     NAIVE_ALONE,
     Arm,
@@ -108,7 +109,8 @@ HARMED = replace(HARMED, summary=summarise(HARM.assign(harm_to_others=HARM["pers
 FORGOTTEN = evidence({NAIVE_ALONE: hundred(0), RETRAINED_VS: hundred(0), ALONE: hundred(20)})
 SLOW = evidence({NAIVE_VS: hundred(0), RETRAINED_VS: hundred(0)}, {NAIVE_VS: 13.5, RETRAINED_VS: 12.0})
 PAIR = {"role": "ego", "ego": "retrained_speedy", "non_ego": "speedy", "persona": "speedy", "seed": 1}
-GAPS = replace(RUN, gaps=pd.DataFrame([PAIR | {"payoff": -20.0, "gap": 2.0, "ci_high": 3.0, "pairs": 50}]))
+GAP = PAIR | {"payoff": -20.0, "gap": 2.0, "ci_high": 3.0, "pairs": 50, "verdict": "not distinguishable from 0"}
+GAPS = replace(RUN, gaps=pd.DataFrame([GAP]))
 REGULATION = {"driver": "careful_and_competent", "from_start_rate": 0.02, "from_start_rate_high": 0.07}
 OF_ARM = {"arm": RETRAINED_VS.name, "seed": 1}
 JUDGED = replace(
@@ -141,6 +143,13 @@ def test_bound__is_kept_by_the_end_of_the_interval(
     assert {(check.value, check.games) for check in checks} == {(value, games)}
     assert checks[0].limit == pytest.approx(limit, abs=1e-4)
     assert (checks[0].arm == ALONE.name) == (name == "failure_rate_alone")
+
+
+def test_gap__of_a_search_that_lacks_power_keeps_no_bound() -> None:
+    below = GAP | {"gap": -3.0, "ci_high": -2.0, "verdict": GapVerdict.LACKS_POWER.value}
+    (check,) = judge({"gap_share": 1.0}, "last", ["speedy"], [1], replace(RUN, gaps=pd.DataFrame([below])))
+    assert not check.passed
+    assert sentence(check) == "not measured: the search ends below the ego's own strategy"
 
 
 def test_near_misses__are_told_by_criterion() -> None:

@@ -109,6 +109,7 @@ def test_find__gives_every_table_or_none_without_pairings_and_responses():
     found = find(pairings, responses, TRAINED_AGAINST, episodes, 0.01)
     assert (len(found.gaps), len(found.crossplay), len(found.generalisation)) == (8, 32, 6)
     assert set(found.equilibria["game"]) == {"speedy", "distracted", "all"}
+    assert found.equilibria.loc[found.equilibria["game"] == "all", "held_out_failure_rate"].notna().all()
     assert find([], [], {}, episodes, 0.01) is None
 
 
