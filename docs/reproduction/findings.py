@@ -104,21 +104,20 @@ class Protocol(Document):
 
 def main(
     run: Annotated[Path, typer.Argument(metavar="RUN", help="The run folder, such as reports/ten-seeds.")],
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Also write the table as CSV.")] = None,
 ) -> None:
     """Print what was expected and what was found as Markdown, a column per training seed."""
     protocol = read_document(PROTOCOL, Protocol)
     if deviations := list(protocol.deviations(json.loads((run / "manifest.json").read_text(encoding="utf-8")))):
         sys.exit("\n".join(f"{run}: {each}" for each in deviations))
-    table = findings(protocol, pd.read_csv(run / "episodes.csv"), pd.read_csv(run / "comparisons.csv"))
+    games = run / "episodes.csv"
+    games = games if games.is_file() else run / "episodes.csv.gz"  # as it is published
+    table = findings(protocol, pd.read_csv(games), pd.read_csv(run / "comparisons.csv"))
     seeds = [f"seed_{seed}" for seed in protocol.seeds]
     print("| quantity | expected | " + " | ".join(name.replace("_", " ") for name in seeds) + " | held |")
     print("| --- | --- |" + " --- |" * (len(seeds) + 1))
     for expected, row in zip(protocol.expected, table.to_dict("records"), strict=True):
         shown = " | ".join(expected.shown(row[name]) for name in seeds)
         print(f"| {row['what']} | {row['expected']} | {shown} | {row['held']} of {len(seeds)} |")
-    if out is not None:
-        table.to_csv(out, index=False)
 
 
 def findings(protocol: Protocol, episodes: pd.DataFrame, comparisons: pd.DataFrame) -> pd.DataFrame:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.evaluation.rule_book.causes import cause_lines
+from harness.evaluation.strategies import NAIVE_VS_SUMO, NaiveEgo, against_persona
 from harness.reports.focus import Focus, focus_of
 from harness.reports.key_figures import egos_of
 from harness.reports.next_steps import NextStep
@@ -68,7 +69,7 @@ def _why(focus: Focus | None, tables: RunTables) -> Iterator[str]:
     for arm, ego in arms.items():
         failed, games = _count(arm, tables)
         against = f" against {focus.persona}" if focus.persona else ""
-        where = against if arm != "naive_vs_sumo" else " against an ordinary driver"
+        where = against if arm != NAIVE_VS_SUMO.name else " against an ordinary driver"
         if failed:
             cause = next(iter(cause_lines(tables.causes[tables.causes["arm"] == arm])), "")
             share, _, words = cause.partition(": ")
@@ -76,6 +77,10 @@ def _why(focus: Focus | None, tables: RunTables) -> Iterator[str]:
             yield f"The {ego} fails{where} in {failed} of {games} games.{mostly}"
         elif arm == focus.arm:
             yield f"The {ego} does not fail{where}: the broken bound is of another kind."
+    if baseline := tables.manifest.get("baseline"):
+        failed, games = _count(against_persona(NaiveEgo(), baseline).name, tables)
+        if failed:
+            yield f"The {tables.naive} also fails against the baseline, {baseline}, in {failed} of {games} games."
 
 
 def _prevented(persona: str, tables: RunTables) -> Iterator[str]:

@@ -165,6 +165,17 @@ def test_answers__a_broken_bound_without_a_failure_is_no_failure():
     )
 
 
+def test_answers__an_ego_that_fails_against_the_baseline_too_is_told_as_such():
+    baseline = against_persona(NaiveEgo(), "careful")
+    run = with_arms((baseline, 6))
+    run = replace(run, manifest={**run.manifest, "baseline": "careful"})
+    assert texts(run)["careful"] == ["10 %, 6 of 60", None]
+    assert [line.person for line in table_in(run)["lines"] if line.warns] == ["careful"]
+    assert answers(run)["Why does it fail?"][-1] == (
+        "The naive ego also fails against the baseline, careful, in 6 of 60 games."
+    )
+
+
 def test_answers__an_ego_that_never_fails_is_told_as_such():
     given = answers(run_of(failing=LAWFUL | {"naive": 0.0, "retrained": 0.0}))
     assert given["Why does it fail?"] == ["No ego fails."]
