@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 State = Literal["ended", "running", "interrupted", "unreadable"]
 
 RELOAD_S = 10
-"""The page of a folder with a run that is going on is loaded again after this time."""
+"""The list is brought up to date after this time while a run is going on."""
 HEADINGS = ("run", "state", "ego", "scene", "people", "seeds", "date", "naive ego at worst", "later egos at worst")
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from harness.evaluation.tables import table_of
+from harness.reports.index_page import IndexedRun, WorstCell, render_index
 from tests.support.chromium import accessibility_violations, unfold
 from tests.support.game_tables import findings, trait_row
 from tests.support.pages import campaign, rendered, with_errors
@@ -32,3 +33,18 @@ def test_report__has_no_violation_without_recorded_games(opened, tmp_path):
     path = tmp_path / "report.html"
     path.write_text(rendered(**campaign(personas=["speedy"], games=20)), encoding="utf-8")
     assert accessibility_violations(opened(path)) == []
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_index__of_runs_has_no_violation(opened, tmp_path, scheme):
+    cell = WorstCell(arm="naive_vs_speedy", failures=3, games=100)
+    done = {"ego": "learned", "scene": "merge", "personas": ["speedy"], "seeds": [1], "finished_on": "2026-11-25"}
+    runs = [
+        IndexedRun(folder=tmp_path / "a", name="a", state="ended", accepted=False, naive=cell, has_page=True, **done),
+        IndexedRun(folder=tmp_path / "b", name="b", state="ended", accepted=True, naive=cell, has_page=True, **done),
+        IndexedRun(folder=tmp_path / "c", name="c", state="running", running=["naive-seed1"], left_s=90.0),
+        IndexedRun(folder=tmp_path / "d", name="d", state="unreadable", problem="it is damaged"),
+    ]
+    path = tmp_path / "index.html"
+    path.write_text(render_index("reports", runs), encoding="utf-8")
+    assert accessibility_violations(opened(path, color_scheme=scheme)) == []
