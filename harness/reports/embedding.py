@@ -86,6 +86,8 @@ class GameTracks:
 
 Marks = Mapping[str, Sequence[Mapping[str, Any]]]
 """The manoeuvres to mark in each game, by `key`."""
+Causes = Mapping[str, str]
+"""Why the ego failed in each game that it did, by `key`."""
 Crowds = Mapping[str, Sequence[str]]
 """The personas of each crowd, in the order of its people."""
 
@@ -95,7 +97,9 @@ def key(arm: str, seed: int, episode: int) -> str:
     return f"{quote(arm, safe='')},{seed},{episode}"
 
 
-def embedded_games(games: Iterable[GameTracks], marks: Marks, crowds: Crowds, budget_bytes: int) -> dict[str, str]:
+def embedded_games(
+    games: Iterable[GameTracks], marks: Marks, causes: Causes, crowds: Crowds, budget_bytes: int
+) -> dict[str, str]:
     """The games that fit into the page as JSON, by `key`, those to watch first at the front.
 
     Games are read until the budget is used up.
@@ -103,7 +107,7 @@ def embedded_games(games: Iterable[GameTracks], marks: Marks, crowds: Crowds, bu
     texts: dict[str, str] = {}
     size = 0
     for game in games:
-        text = game_text(game, marks, crowds)
+        text = game_text(game, marks, causes, crowds)
         size += len(text)
         if size > budget_bytes:
             break
@@ -118,8 +122,8 @@ def recorded_document(scene: Mapping[str, Any] | None, games: Iterable[str]) -> 
     return Markup("{" + head + ',"games":[' + ",\n".join(games) + "]}")
 
 
-def game_text(game: GameTracks, marks: Marks, crowds: Crowds) -> str:
-    """One game as JSON, with its manoeuvres and the personas of its crowd, if it has one."""
+def game_text(game: GameTracks, marks: Marks, causes: Causes, crowds: Crowds) -> str:
+    """One game as JSON, with its manoeuvres, why the ego failed, and the personas of its crowd, if it has one."""
     crowd = crowds.get(game.persona, ())
     people = dict(zip(roles_of(1 + len(crowd))[NON_EGO:], crowd, strict=True)) if crowd else {}
     times = [player.columns["time_to_collision_s"] for player in game.players if player.name == "ego"]
@@ -137,6 +141,7 @@ def game_text(game: GameTracks, marks: Marks, crowds: Crowds) -> str:
             "step": game.step_s,
             "steps": game.steps,
             "outcome": game.outcome,
+            "cause": causes.get(key(game.arm, game.seed, game.episode), ""),
             "leastTime": round(measured[0], 2) if measured else None,
             "players": players,
             "background": [_track(vehicle) for vehicle in game.background],

@@ -42,8 +42,19 @@ def _game(row: Any) -> dict[str, Any]:
         "episode": row.episode,
         "outcome": row.ego_outcome,
         "time_s": max(row.time_s - RUN_UP_S, 0.0),
-        "text": f"{row.deed}, {row.time_left_s:.1f} s before the end" if row.other else row.deed,
+        "text": _told(row),
     }
+
+
+def causes_by_game(causes: pd.DataFrame) -> Mapping[str, str]:
+    """Why the ego failed, and what it did, for each row of `causes.csv`, by the game's `key`."""
+    return {
+        key(row.arm, row.seed, row.episode): f"{_told(row)}; the ego: {row.reaction}" for row in causes.itertuples()
+    }
+
+
+def _told(row: Any) -> str:
+    return f"{row.deed}, {row.time_left_s:.1f} s before the end" if row.other else str(row.deed)
 
 
 def marks_of(manoeuvres: pd.DataFrame | None) -> Mapping[str, Sequence[Mapping[str, Any]]]:

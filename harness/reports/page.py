@@ -22,7 +22,7 @@ from harness.reports.first_answers import first_answers
 from harness.reports.game import game_section
 from harness.reports.game_links import GameLinks
 from harness.reports.learning import learning, searches, stopped
-from harness.reports.manoeuvres import failures_by_cause, marks_of
+from harness.reports.manoeuvres import causes_by_game, failures_by_cause, marks_of
 from harness.reports.next_steps import next_steps
 from harness.reports.page_template import CONTENT_POLICY, ELSEWHERE, LIBRARIES, SCRIPTS, environment_of, sources
 from harness.reports.provenance import QUICK, asked_alone, command_of, facts, made_by, mixed_versions
@@ -57,7 +57,13 @@ def render_page(
     `games`, those to watch first at the front, are embedded as far as they fit (`GAMES_BYTES`); `paths` are drawn over
     one another. Without a `scene`, the road as `road.js` reads it, there are neither.
     """
-    texts = embedded_games(games if scene is not None else (), marks_of(tables.manoeuvres), tables.crowds, GAMES_BYTES)
+    texts = embedded_games(
+        games if scene is not None else (),
+        marks_of(tables.manoeuvres),
+        causes_by_game(tables.causes),
+        tables.crowds,
+        GAMES_BYTES,
+    )
     links = GameLinks(embedded=texts, episodes=tables.episodes)
     environment = environment_of("reports")
     arms, pairs = failures_by_cause(tables.of_own_traits(tables.causes), texts)

@@ -52,7 +52,9 @@ class GameScreen {
   heading() {
     const { game } = this;
     const badge = make("span", { class: `badge ${game.outcome === "goal" ? "well" : "failed"}`, text: OUTCOMES[game.outcome] ?? game.outcome });
-    return make("h3", {}, document.createTextNode(`${titleOf(game)} `), badge);
+    const title = make("h3", {}, document.createTextNode(`${titleOf(game)} `), badge);
+    if (game.cause) title.append(make("span", { class: "cause", text: game.cause }));
+    return title;
   }
 
   described() {

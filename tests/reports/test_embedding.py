@@ -39,9 +39,9 @@ def test_columns__are_the_trace_to_half_a_unit(games):
 
 def test_embedded__as_many_as_fit_and_no_further_game_is_read(games):
     keys = [key(game.arm, game.seed, game.episode) for game in games]
-    assert list(embedded_games(games, {}, {}, 10_000_000)) == keys
+    assert list(embedded_games(games, {}, {}, {}, 10_000_000)) == keys
     one_by_one = iter(games)
-    part = embedded_games(one_by_one, {}, {}, 20_000)
+    part = embedded_games(one_by_one, {}, {}, {}, 20_000)
     assert 0 < len(part) < len(games)
     assert list(part) == keys[: len(part)]
     assert sum(map(len, part.values())) <= 20_000
@@ -53,5 +53,5 @@ def test_document__names_the_persona_of_each_of_a_crowd(games):
     people = [replace(person, name=name) for name in ("non_ego", "non_ego_2")]
     game = replace(games[0], persona="rush", players=[ego, *people])
     for crowds, expected in ({"rush": ["speedy", "anna"]}, [None, "speedy", "anna"]), ({}, [None, None, None]):
-        (text,) = embedded_games([game], {}, crowds, 10_000_000).values()
+        (text,) = embedded_games([game], {}, {}, crowds, 10_000_000).values()
         assert [player.get("persona") for player in json.loads(text)["players"]] == expected

@@ -59,6 +59,16 @@ def scrub(page, time_s):
     )
 
 
+# --- the title ---
+
+
+def test_title__says_why_the_ego_failed(player, games):
+    page = player()
+    assert games[GAME].outcome != "goal"
+    heading = page.locator(".screen h3").first.inner_text()
+    assert "1.2 s before the end; the ego: " in heading
+
+
 # --- the clock ---
 
 

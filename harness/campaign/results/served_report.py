@@ -23,7 +23,7 @@ from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import TraceReader
 from harness.evaluation.worst_first import worst_first
 from harness.reports.embedding import game_text
-from harness.reports.manoeuvres import marks_of
+from harness.reports.manoeuvres import causes_by_game, marks_of
 from harness.reports.page_template import SERVED_POLICY, served_page
 from harness.reports.run_tables import crowds_of
 from harness.road.scene.open_scene import open_scene
@@ -48,6 +48,7 @@ class ServedReport:
         page = folder.result("report.html").read_text(encoding="utf-8")
         episodes = episodes_of(folder)
         self._marks = marks_of(read_csv(folder.result("manoeuvres.csv")))
+        self._causes = causes_by_game(read_csv(folder.result("causes.csv")))
         self._scene = open_scene(folder.scene)
         played = worst_first(episodes[(episodes["error"] == "") & (episodes["ego_outcome"] != "error")])
         rows: list[Any] = list(played.itertuples())
@@ -67,7 +68,7 @@ class ServedReport:
         with self._lock:  # the reader keeps one file open
             traces = traces_of(self._folder, game.arm, game.seed, game.episode)
             trace = read_trace(traces, game.episode, self._reader)
-        return game_text(tracks_of(trace, self._scene, game), self._marks, self._crowds).encode()
+        return game_text(tracks_of(trace, self._scene, game), self._marks, self._causes, self._crowds).encode()
 
 
 def _entry(game: Any) -> list[Any]:
