@@ -79,9 +79,13 @@ class Expected(Document):
 
     def shown(self, value: float) -> str:
         """A value of the quantity as text."""
-        return (
-            f"{value:.2g}" if self.quantity == "p_holm" else f"{value:+.1%}" if "speed" in self.what else f"{value:.0%}"
-        )
+        match self.quantity:
+            case "p_holm":
+                return f"{value:.2g}"
+            case "speed_change":
+                return f"{value:+.1%}"
+            case _:
+                return f"{value:.0%}"
 
 
 class Protocol(Document):
