@@ -166,7 +166,7 @@ def collect(problems: list[Problem], action: Callable[[], T]) -> T | None:
         return None
 
 
-ALIKE = 0.7
+ALIKE = 0.65
 """The likeness of two names (`difflib.SequenceMatcher.ratio`) from which one is a misspelling of the other."""
 _COMPARED_CHARACTERS = 200
 
