@@ -60,13 +60,13 @@ class PersonLine:
 
     person: str
     cells: Sequence[FailureCell | None]
-    is_lawful: bool = False
-    """Whether the person does nothing that causes a failure: an ego that fails against it fails by itself."""
+    is_baseline: bool = False
+    """Whether the personas are compared with it: nobody, the ordinary driver, the careful person."""
 
     @property
     def warns(self) -> bool:
-        """Whether an ego fails against a person who does nothing wrong."""
-        return self.is_lawful and any(cell is not None and cell.tone != "none" for cell in self.cells)
+        """Whether an ego fails where none of the personas takes part."""
+        return self.is_baseline and any(cell is not None and cell.tone != "none" for cell in self.cells)
 
 
 def failure_table(tables: RunTables, links: GameLinks) -> dict[str, Any] | None:
@@ -82,7 +82,6 @@ def failure_table(tables: RunTables, links: GameLinks) -> dict[str, Any] | None:
         "columns": columns,
         "lines": lines,
         "top": top,
-        "ends": [percent(share * top) for share in (0.0, 0.5, 1.0)],
         "tones": {tone: words for tone, words in TONES.items() if any(cell.tone == tone for cell in cells)},
     }
 
@@ -103,12 +102,12 @@ def _lines(tables: RunTables, links: GameLinks) -> Iterator[PersonLine]:
     def cells(non_ego: SumoNonEgo | PersonaNonEgo | None) -> list[FailureCell | None]:
         return [_cell([Arm(ego=ego, non_ego=non_ego).name for ego in column], tables, links) for column in egos]
 
-    judged = {persona: _taken_over(persona, tables, links) for persona in tables.personas}
+    judged = {persona: _taken_over(persona, tables) for persona in tables.personas}
     last: list[FailureCell | None] = [None] if any(judged.values()) else []
-    yield PersonLine(person=NOBODY, cells=cells(None) + last, is_lawful=True)
-    yield PersonLine(person=ORDINARY, cells=cells(SumoNonEgo()) + last, is_lawful=True)
+    yield PersonLine(person=NOBODY, cells=cells(None) + last, is_baseline=True)
+    yield PersonLine(person=ORDINARY, cells=cells(SumoNonEgo()) + last, is_baseline=True)
     if (baseline := tables.manifest.get("baseline")) and baseline not in tables.personas:
-        yield PersonLine(person=baseline, cells=cells(PersonaNonEgo(persona=baseline)) + last, is_lawful=True)
+        yield PersonLine(person=baseline, cells=cells(PersonaNonEgo(persona=baseline)) + last, is_baseline=True)
     for persona in tables.personas:
         own = [[tables.last_ego(persona)] if len(column) > 1 else column for column in egos]
         met = [_cell([against_persona(ego, persona).name for ego in column], tables, links) for column in own]
@@ -157,7 +156,7 @@ def _tone(rows: Sequence[Row]) -> str:
     return "small" if risk <= 0.01 else "medium" if risk <= 0.1 else "severe"
 
 
-def _taken_over(persona: str, tables: RunTables, links: GameLinks) -> FailureCell | None:
+def _taken_over(persona: str, tables: RunTables) -> FailureCell | None:
     """The failures of the naive ego that the driver of UN R157 does not prevent by taking over at the danger."""
     arm = against_persona(NaiveEgo(), persona).name
     prevented = {row["seed"]: row["from_conflict_prevented"] for row in tables.prevented_in(arm)}
@@ -171,6 +170,5 @@ def _taken_over(persona: str, tables: RunTables, links: GameLinks) -> FailureCel
         rate=percent(failed / games),
         counts=f"{failed:,} of {games:,}",
         spans=[(each["rate"], each["rate_low"], each["rate_high"]) for each in shares],
-        tone=_tone(list(rates.values())) if failed else "none",
-        game=links.worst(arm) if failed else "",
+        tone="unknown" if failed else "none",  # how severe its own collisions would be is not computed
     )

@@ -18,7 +18,18 @@ State = Literal["ended", "running", "interrupted", "unreadable"]
 
 RELOAD_S = 10
 """The list is brought up to date after this time while a run is going on."""
-HEADINGS = ("run", "state", "ego", "scene", "people", "seeds", "date", "naive ego at worst", "later egos at worst")
+HEADINGS = (
+    "run",
+    "state",
+    "ego",
+    "scene",
+    "people",
+    "seeds",
+    "date",
+    "harness",
+    "naive ego at worst",
+    "later egos at worst",
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,7 +134,8 @@ def record_of(run: IndexedRun) -> dict[str, Any]:
 
 def _cells(run: IndexedRun) -> list[str]:
     seeds = ", ".join(map(str, run.seeds)) if len(run.seeds) <= 3 else f"{len(run.seeds)} seeds"
-    return [run.ego, run.scene, ", ".join(run.personas), seeds, run.finished_on, _worst(run.naive), _worst(run.last)]
+    made = [run.ego, run.scene, ", ".join(run.personas), seeds, run.finished_on, run.version]
+    return [*made, _worst(run.naive), _worst(run.last)]
 
 
 def _state(run: IndexedRun) -> str:

@@ -13,7 +13,7 @@ from typing import Any
 from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.results.ci_files import RESULT
 from harness.campaign.storage.locks import is_held
-from harness.campaign.storage.manifest import planned
+from harness.campaign.storage.manifest import FINISHED, planned
 from harness.campaign.storage.run_folder import MANIFEST, RunFolder
 from harness.campaign.storage.run_log import LOG
 from harness.errors import HarnessError, UsageError
@@ -21,7 +21,6 @@ from harness.evaluation.strategies import NaiveEgo
 from harness.reports.index_page import IndexedRun, WorstCell
 from harness.reports.provenance import ego_of, finished_on, scene_of
 
-_FINISHED = ("done", "settled")
 _LINE = re.compile(r"(?P<time>\S+Z) \S+ +(?P<what>started|done|failed) +(?P<stage>[^\s:]+)")
 
 
@@ -43,7 +42,7 @@ def _indexed(path: Path) -> IndexedRun:
 def _read(folder: RunFolder) -> IndexedRun:
     manifest = folder.manifest()
     entries: Mapping[str, Mapping[str, Any]] = manifest["stages"]
-    done = [name for name, entry in entries.items() if entry["status"] in _FINISHED]
+    done = [name for name, entry in entries.items() if entry["status"] in FINISHED]
     has_page = (folder.path / "report.html").is_file()
     has_ended = len(done) == len(entries) and (folder.path / "summary.csv").is_file()
     held = not has_ended and is_held(folder.lock)
@@ -119,9 +118,9 @@ def _left_s(entries: Mapping[str, Mapping[str, Any]], begun: Sequence[re.Match[s
     stages were carried out beside one another."""
     spent: dict[str, list[float]] = {}
     for entry in entries.values():
-        if entry["status"] in _FINISHED and entry.get("seconds"):
+        if entry["status"] in FINISHED and entry.get("seconds"):
             spent.setdefault(entry["kind"], []).append(entry["seconds"])
-    kinds = [entry["kind"] for entry in entries.values() if entry["status"] not in _FINISHED]
+    kinds = [entry["kind"] for entry in entries.values() if entry["status"] not in FINISHED]
     if not begun or any(kind not in spent for kind in kinds):
         return None
     elapsed_s = sum(_durations_s(begun))

@@ -17,8 +17,6 @@ class ServedRuns:
     """What the server of a folder of runs sends, by path. Runs may begin, go on and end while it serves."""
 
     def __init__(self, folder: Path) -> None:
-        """Raises UsageError if it is no folder."""
-        runs_in(folder)
         self._folder, self._lock = folder, Lock()
         self._reports: dict[tuple[str, int], ServedReport] = {}
 
