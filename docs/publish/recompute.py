@@ -3,10 +3,10 @@
     python docs/publish/recompute.py                 # all folders in reports/
     python docs/publish/recompute.py reports/merge   # these
 
-It reads episodes.csv, or episodes.csv.gz, and compares with summary.csv, comparisons.csv, over_trainings.csv and
-attribution.csv of the same folder. It imports nothing of the harness: its formulas are written a second time, from the
-descriptions in docs/columns.md and docs/verdicts.md. It prints how many cells agree, each that does not, and ends with
-exit code 1 if one does not.
+It reads episodes.csv, or episodes.csv.gz, and compares with summary.csv, comparisons.csv, over_trainings.csv,
+attribution.csv, crossplay.csv, gaps.csv, generalisation.csv and equilibria.csv of the same folder. It imports nothing
+of the harness: its formulas are written a second time, from the descriptions in docs/columns.md and docs/verdicts.md.
+It prints how many cells agree, each that does not, and ends with exit code 1 if one does not.
 """
 
 from __future__ import annotations
@@ -192,6 +192,93 @@ def attribution(table: pd.DataFrame, games: Games) -> Iterator[Cell]:
         yield f"attribution, p_holm {number}", as_published, value
 
 
+def crossplay(table: pd.DataFrame, games: Games) -> Iterator[Cell]:
+    for row in table.to_dict("records"):
+        arm, where = games.of(row["arm"], row["seed"]), f"crossplay, {row['arm']}, seed {row['seed']}"
+        failed = arm["ego_failed"].dropna().astype(float)
+        yield f"{where}, games", row["games"], len(failed)
+        if not len(failed):
+            continue
+        low, high = clopper_pearson(failed.sum(), len(failed))
+        for end, value in (("", failed.mean()), ("_low", low), ("_high", high)):
+            yield f"{where}, failure_rate{end}", row[f"failure_rate{end}"], value
+        for name, column in (("ego_payoff", "ego_payoff"), ("ego_mean_speed_mps", "ego_mean_speed_mps")):
+            yield f"{where}, {name}", row[name], arm.loc[failed.index, column].mean()
+        if not math.isnan(row["non_ego_payoff"]):
+            yield f"{where}, non_ego_payoff", row["non_ego_payoff"], arm.loc[failed.index, "non_ego_payoff"].mean()
+
+
+def gaps(table: pd.DataFrame, games: Games, cells: pd.DataFrame) -> Iterator[Cell]:
+    """`cells` is crossplay.csv, which says in which arm two strategies meet."""
+    p_values = []
+    for row in table.to_dict("records"):
+        p_values.append(row["p_value"])
+        seed, role, column = row["seed"], row["role"], f"{row['role']}_payoff"
+        where = f"gaps, {row['ego']} {row['non_ego']} {role}, seed {seed}"
+        of_seed = cells[cells["seed"] == seed]
+        other = "non_ego" if role == "ego" else "ego"
+        met = of_seed[(of_seed[other] == row[other]) & (of_seed["persona"].isin([row["persona"]]))]
+        pair_arm = met.loc[met[role] == row[role], "arm"].item()
+        own = games.of(pair_arm, seed)[column]
+        answers = [games.of(f"{pair_arm}_{role}_response", seed)[column]]
+        answers += [games.of(arm, seed)[column] for arm in met.loc[met[role] != row[role], "arm"]]
+        both = pd.concat([own, *(each for each in answers if len(each))], axis=1).dropna().astype(float)
+        yield f"{where}, pairs", row["pairs"], len(both)
+        yield f"{where}, known", row["known"], both.shape[1] - 2
+        if not len(both):
+            continue
+        pair, responses = both.iloc[:, 0], both.iloc[:, 1:].set_axis(range(both.shape[1] - 1), axis=1)
+        even = both.index % 2 == 0
+        best = responses[responses[~even].mean().idxmax()].where(even, responses[responses[even].mean().idxmax()])
+        yield f"{where}, payoff", row["payoff"], pair.mean()
+        yield f"{where}, gap", row["gap"], (best - pair).mean()
+        yield f"{where}, search_gap", row["search_gap"], (responses[0] - pair).mean()
+        if not math.isnan(row["p_value"]):
+            t = (best - pair).mean() / ((best - pair).std() / math.sqrt(len(both)))
+            low, high = t_interval(best - pair)
+            found = {"ci_low": low, "ci_high": high, "p_value": stats.t.sf(t, len(both) - 1)}
+            for name, value in found.items():
+                yield f"{where}, {name}", row[name], value
+    for row, value in zip(table.to_dict("records"), holm(p_values, len(p_values)), strict=True):
+        yield f"gaps, {row['ego']} {row['non_ego']} {row['role']}, p_holm", row["p_holm"], value
+
+
+def generalisation(table: pd.DataFrame, games: Games, cells: pd.DataFrame) -> Iterator[Cell]:
+    arms = cells.set_index(["seed", "ego", "non_ego"])["arm"]
+    for row in table.to_dict("records"):
+        where = f"generalisation, {row['ego']} {row['non_ego']}, seed {row['seed']}"
+        naive, now = (arms.get((row["seed"], ego, row["non_ego"]), "") for ego in ("naive", row["ego"]))
+        fewer = games.differences(now, naive, row["seed"], "ego_failed")
+        yield f"{where}, pairs", row["pairs"], len(fewer)
+        if len(fewer):
+            yield f"{where}, fewer_failures", row["fewer_failures"], fewer.mean()
+        if not math.isnan(row["p_value"]):
+            t = fewer.mean() / (fewer.std() / math.sqrt(len(fewer)))
+            yield f"{where}, p_value", row["p_value"], stats.t.sf(t, len(fewer) - 1)
+    for row, value in zip(table.to_dict("records"), holm(table["p_value"].tolist(), len(table)), strict=True):
+        yield f"generalisation, {row['ego']} {row['non_ego']}, p_holm", row["p_holm"], value
+
+
+def equilibria(table: pd.DataFrame, cells: pd.DataFrame) -> Iterator[Cell]:
+    """What the published shares of each solution give, from crossplay.csv, and that nobody gains by a change."""
+    for (seed, game, solution, number), rows in table.groupby(["seed", "game", "solution", "number"], dropna=False):
+        egos, non_egos = (rows[rows["role"] == role].set_index("player") for role in ("ego", "non_ego"))
+        of_seed = cells[cells["seed"] == seed].set_index(["ego", "non_ego"])
+        failures, ego_payoff, non_ego_payoff = (
+            of_seed[name].unstack().reindex(index=egos.index, columns=non_egos.index)
+            for name in ("failure_rate", "ego_payoff", "non_ego_payoff")
+        )
+        where, x, y = f"equilibria, {game} {solution} {number}, seed {seed}", egos["share"], non_egos["share"]
+        if solution == "safest":
+            yield f"{where}, worst", rows["solution_failure_rate"].iloc[0], (x @ failures).max()
+        elif solution == "nash":
+            yield f"{where}, failures", rows["solution_failure_rate"].iloc[0], x @ failures @ y
+            for role, shares, payoffs in (("ego", x, ego_payoff @ y), ("non_ego", y, x @ non_ego_payoff)):
+                published = rows[rows["role"] == role].iloc[0]
+                yield f"{where}, {role} payoff", published["solution_payoff"], shares @ payoffs
+                yield f"{where}, {role} regret", published["regret"], max(0.0, payoffs.max() - shares @ payoffs)
+
+
 def cells_of(run: Path) -> Iterator[Cell]:
     games, tables = Games(run), {path.stem: pd.read_csv(path) for path in sorted(run.glob("*.csv"))}
     yield from summary(tables["summary"], games)
@@ -200,6 +287,12 @@ def cells_of(run: Path) -> Iterator[Cell]:
         yield from over_trainings(tables["over_trainings"], games, tables["comparisons"])
     if "attribution" in tables:
         yield from attribution(tables["attribution"], games)
+    if "crossplay" in tables:
+        met = tables["crossplay"]
+        yield from crossplay(met, games)
+        yield from gaps(tables["gaps"], games, met) if "gaps" in tables else ()
+        yield from generalisation(tables["generalisation"], games, met) if "generalisation" in tables else ()
+        yield from equilibria(tables["equilibria"], met)
 
 
 def agree(published: float, computed: float) -> bool:
