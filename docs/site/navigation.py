@@ -35,6 +35,7 @@ SECTIONS = {
         "glossary",
         "verdicts",
         "preventability",
+        "falsification",
         "manoeuvres",
         "game",
         "architecture",

@@ -21,6 +21,7 @@ from harness.evaluation.column import (
     Column,
     rate,
 )
+from harness.evaluation.falsification_columns import FALSIFICATION, SEARCHES
 from harness.evaluation.measured_game import METRICS_OF_CONDUCT, METRICS_OF_GAMES, METRICS_OF_PLAYERS
 from harness.evaluation.over_trainings_columns import OVER_TRAININGS
 from harness.evaluation.preventability_columns import PREVENTABILITY, REFERENCE_DRIVERS
@@ -45,6 +46,7 @@ _P = Column("p_value", NUMBER, "Of the paired one-tailed t-test.", unit=P_VALUE,
 _P_HOLM = Column(
     "p_holm", NUMBER, "Corrected for all rows of the table.", unit=P_VALUE, label="p after Holm", source="Holm 1979"
 )
+_P_LOG_RANK = replace(_P, meaning="Of the log-rank test, two-sided.", source="Mantel 1966")
 _P_PLANNED = replace(_P_HOLM, meaning="Corrected for all planned tests; of harm for those of harm; else empty.")
 _PLANNED = Column("planned_tests", MAYBE, "The tests that the correction is over; empty: the test is secondary.")
 _ABOUT = Column("about", TEXT, "What the verdict holds for: `this trained pair`, or `trainings like this`.")
@@ -322,6 +324,8 @@ _TABLES = {
         ).with_interval(_T),
         *(_P, _P_HOLM, _VERDICT, _REASON),
     ),
+    "searches": SEARCHES,
+    "falsification": (*FALSIFICATION, _P_LOG_RANK, _P_HOLM, _VERDICT),
     "reference_drivers": (*_GAME, _outcome("ego", "ego"), *REFERENCE_DRIVERS),
     "preventability": (ARM, PERSONA, SEED, *PREVENTABILITY),
 }

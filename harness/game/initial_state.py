@@ -27,11 +27,12 @@ from harness.game.human_factors import (
     draw_lapses,
     glances_over_shoulder,
 )
+from harness.game.ordinary_driver import OrdinaryDriver
 from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles
 from harness.game.road import Routes
 from harness.game.roles import EGO
 from harness.game.seeding import between, generator_of, parts_of, seed_of
-from harness.game.start_range import StartRange, draw_along_route
+from harness.game.start_range import StartRange, draw_along_route, starts_in
 
 _UNLIMITED = (Reaction(), Sight(), ActuatorShares())
 
@@ -76,6 +77,7 @@ class InitialState:
     signal_place: float  # in the cycles of traffic lights at which the game starts, from 0 to 1
     follower: Follower | None  # who follows the ego; None: nobody does
     parts: tuple[str | int, ...]  # parts of the seeds
+    ordinary_driver: OrdinaryDriver | None = None  # of people that SUMO drives; None: as their vehicle types say
 
     @property
     def noise(self) -> FloatArray:
@@ -128,13 +130,13 @@ def draw_initial_state(starts: StartDistribution, *parts: str | int) -> InitialS
     """Draw the initial state of one game, with seeds hashed from the named parts."""
     generator = generator_of(*parts, "start")
     players = range(len(starts.places))
-    draws = iter(generator.random(4 * len(players)).tolist())  # the same numbers as drawn one by one
-    poses: list[tuple[float, ...]] = []
-    for place, length in zip(starts.places, starts.length_m.tolist(), strict=True):
-        share, speed = next(draws), between(place.speed_mps, next(draws))
-        ego_mps, ego_m = poses[0][-2:] if poses else (speed, 0.0)
-        position = place.position_m(share, speed, ego_m, ego_mps)
-        poses.append((*place.pose(position, length), speed, position))
+    drawn = generator.random(4 * len(players))  # the same numbers as drawn one by one
+    draws = iter(drawn[2 * len(players) :].tolist())
+    positions_m, speeds_mps = starts_in(starts.places, drawn[: 2 * len(players)].reshape(-1, 2))
+    poses = [
+        place.pose(position, length)
+        for place, position, length in zip(starts.places, positions_m, starts.length_m.tolist(), strict=True)
+    ]
     present = _present(draws, starts.present_share)
     member = [
         0 if len(shares) == 1 else draw_member(shares, player, *parts) for player, shares in enumerate(starts.shares)
@@ -147,7 +149,8 @@ def draw_initial_state(starts: StartDistribution, *parts: str | int) -> InitialS
         if each.attention is not None:
             of_player = generator_of(*parts, "attention", player)
             lapses[player] = draw_lapses(each.attention, starts.steps, starts.step_s, of_player)
-    x, y, heading, speeds, positions = np.array(poses).T
+    x, y, heading = np.array(poses).T
+    positions, speeds = np.array(positions_m), np.array(speeds_mps)
     stations = positions - 0.5 * starts.length_m
     if starts.along_route_share and not (starts.meet_in_place and sum(present) > 1):
         along = draw_along_route(

@@ -8,6 +8,7 @@ route. With starts along the whole route, every part of it is practised from the
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -18,6 +19,7 @@ import numpy as np
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.geometry import Box, box_distance, boxes_of
 from harness.game.road import Routes
+from harness.game.roles import EGO
 from harness.game.seeding import between
 
 _BEFORE_GOAL_M = 10.0
@@ -85,6 +87,16 @@ class StartRange:
         """The points of the line, and the distance of each along the line."""
         lengths = np.hypot(*np.diff(self.line, axis=0).T)
         return self.line.tolist(), [0.0, *np.cumsum(lengths).tolist()]
+
+
+def starts_in(places: Sequence[StartRange], shares: FloatArray) -> tuple[list[float], list[float]]:
+    """The positions and speeds of players at shares [P, 2], from 0 to 1, of their ranges of positions and of speeds."""
+    positions_m, speeds_mps = list[float](), list[float]()
+    for place, (share, of_speeds) in zip(places, shares.tolist(), strict=True):
+        speeds_mps.append(between(place.speed_mps, of_speeds))
+        ego_m = positions_m[EGO] if positions_m else 0.0
+        positions_m.append(place.position_m(share, speeds_mps[-1], ego_m, speeds_mps[EGO]))
+    return positions_m, speeds_mps
 
 
 def draw_along_route(

@@ -16,6 +16,7 @@ import numpy as np
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.geometry import Box, box_distance, boxes_of
 from harness.game.initial_state import InitialState
+from harness.game.ordinary_driver import OrdinaryDriver
 from harness.game.roles import EGO
 from harness.road.demand.route_file import SHARE, Departure, Motion
 from harness.road.demand.stops import Stop
@@ -96,6 +97,14 @@ class Insertion:
             libsumo.vehicle.setActionStepLength(name, departure.follower.reaction_s)
         for stop in departure.stops:
             _add_stop(prefix, name, stop, departure.depart_s)
+
+
+def drive_as(name: str, driver: OrdinaryDriver) -> None:
+    """Give a vehicle that has just been added the parameters of its driver."""
+    libsumo.vehicle.setTau(name, driver.time_gap_s)
+    libsumo.vehicle.setImpatience(name, driver.impatience)
+    libsumo.vehicle.setParameter(name, "laneChangeModel.lcAssertive", str(driver.assertive))
+    libsumo.vehicle.setSpeedFactor(name, driver.speed_factor)  # last: setTau gives the vehicle a type, with its factor
 
 
 def in_tile(prefix: str, lane: str) -> str:

@@ -43,6 +43,7 @@ from harness.sumo.insertion import (
     StandingVehicles,
     clear_of_obstacles,
     clear_of_players,
+    drive_as,
     with_follower,
 )
 from harness.sumo.road_signals import Signals, SpeedLimits
@@ -240,6 +241,8 @@ class LibsumoSimulation(Simulation):
                 libsumo.vehicle.setSpeedFactor(name, _ANY_SPEED)
         else:
             self._sumo_driven[name] = (game, player)
+            if start.ordinary_driver is not None and player != EGO:
+                drive_as(name, start.ordinary_driver)
             ahead += speed * self._scene.world.step_s  # SUMO does not move a vehicle in the step of its insertion
         heading = float(start.heading_rad[player])
         x = float(start.x_m[player] + ahead * np.cos(heading))

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
+from harness.assessment.rollout import SeatedArm
 from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import RunContext
 from harness.campaign.plan.stages import (
@@ -88,6 +89,12 @@ class RunPlayers:
             remedy = f"name an arm of an ego against people; {nearest(name, names)}"
             raise UsageError.of(self._folder.path, name, f"has no such arm of seed {seed}", remedy)
         return arms[name, seed]
+
+    def seated(self, stage: AssessmentStage) -> SeatedArm:
+        """The players of an arm. Raises UsageError if one can't be made."""
+        self.ego(stage)
+        self.people(stage, episode=0)
+        return PlayerFactory(context=self._context, scene=self.scene).arm(stage)
 
     def ego(self, stage: AssessmentStage) -> SeatedDriver:
         """The ego of an arm. Raises UsageError if it can't be made."""

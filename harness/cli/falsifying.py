@@ -1,0 +1,82 @@
+"""The command `harness falsify`: learned people against searchers."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.markup import escape
+
+from harness.cli.output import AllowCode, AsJson, RunPath, output, print_json, print_plain
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from rich.table import Table
+
+
+def falsify(
+    run: RunPath,
+    arms: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[ARM]...", help="Arms of one ego, one of them with SUMO's driver.  [default: naive's]"),
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="The training seed.  [default: the first of the campaign]")] = None,
+    games: Annotated[int, typer.Option(min=20, metavar="N", help="Games of each search.")] = 200,
+    repeats: Annotated[int, typer.Option(min=2, metavar="N", help="Searches of each kind.")] = 10,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder of the tables.  [default: RUN]")] = None,
+    ego: Annotated[str | None, typer.Option(metavar="DRIVER", help="The campaign's ego, if no policy of it.")] = None,
+    allow_code: AllowCode = False,
+    as_json: AsJson = False,
+) -> None:
+    """Compare learned people with searchers: in how many games does each make the ego fail for the first time?
+
+    Learned people play from random starts. Searchers (random, cross-entropy, CMA-ES) choose the starts, and the
+    parameters of SUMO's driver in the people's place. Writes searches.csv and falsification.csv.
+    """
+    with output(as_json) as console:
+        from harness.campaign.execution.falsify_run import carry_out_searches, planned_searches, write_searches
+        from harness.campaign.execution.run_players import RunPlayers
+        from harness.campaign.results.shown_work import progress_bar
+        from harness.campaign.storage.run_folder import RunFolder
+
+        folder = RunFolder(run)
+        manifest = folder.manifest()
+        players = RunPlayers(folder, ego=ego, allow_code=allow_code)
+        searches = planned_searches(players, arms or [], int(manifest["seeds"][0]) if seed is None else seed)
+        with progress_bar("games", console) as show:
+            results = list(carry_out_searches(players, searches, games=games, repeats=repeats, on_progress=show))
+        significance = manifest["campaign"]["assessment"]["significance"]
+        searched, found = write_searches(results, out or run, significance)
+        console.print(_shown(searched))
+        print_plain(_sentences(found), console)
+        print_plain([f"{(out or run) / 'falsification.csv'}"], console)
+        if as_json:
+            print_json({"falsification": json.loads(found.to_json(orient="records"))})
+
+
+def _shown(searches: pd.DataFrame) -> Table:
+    """Who plays, a row each; the mean of the games until the first find, and how many searches found something."""
+    from rich.table import Table
+
+    criteria = list(dict.fromkeys(searches["criterion"]))
+    table = Table("arm", "starts", *(escape(each.replace("_", " ")) for each in criteria))
+    table.title = "Mean games until the ego fails, and until it fails in a game that a reference driver prevents"
+    for (arm, searcher), rows in searches.groupby(["arm", "searcher"], sort=False):
+        cells = []
+        for criterion in criteria:
+            first = rows.loc[rows["criterion"] == criterion, "first_game"]
+            mean = first.fillna(rows["games"].iloc[0]).astype(float).mean()
+            cells.append(f"{mean:.0f} ({first.notna().sum()} of {len(first)})")
+        table.add_row(escape(arm), escape(searcher), *cells)
+    return table
+
+
+def _sentences(found: pd.DataFrame) -> Iterator[str]:
+    """A line for each criterion: what comes out of how many comparisons of learned people with a searcher."""
+    for criterion, rows in found.groupby("criterion", sort=False):
+        counts = rows["verdict"].value_counts(sort=False)
+        said = ", ".join(f"{verdict} in {count}" for verdict, count in counts.items())
+        yield f"{str(criterion).replace('_', ' ')}, {len(rows)} comparisons: {said}"
