@@ -56,8 +56,8 @@ TUTORIALS = {
         Picture("tutorials/failure.png", "reports/my_ego/report.html#game=naive_vs_paper_speedy,11,5", 1280, 760),
     ),
     "your-own-person": (
-        Picture("tutorials/your-own-person.png", "late_lee.html", 1280, 760),
-        Picture("tutorials/result-of-a-person.png", "reports/lee-quick/report.html"),
+        Picture("tutorials/late_lee.png", "late_lee.html", 1280, 760),
+        Picture("tutorials/lee.png", "reports/lee-quick/report.html"),
     ),
     "your-own-junction": (
         Picture("tutorials/conflicts.png", "net.html", 900, 600, keys=("Tab", *"+++++++++")),
