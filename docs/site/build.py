@@ -60,16 +60,17 @@ def copy_files(folder: Path, out: Path) -> None:
 
 
 def write_source(folder: Path) -> None:
-    """Write every page and picture of the site into a folder."""
+    """Write every page, picture and file to copy of the site into a folder."""
     docs = ROOT / "docs"
     pages = {name.relative_to(docs).as_posix(): name for name in sorted(docs.rglob("*.md"))}
     pages |= {site: ROOT / name for name, site in FROM_ROOT.items()}
     made = reference_pages.pages(docs / "schemas") | {"index.md": navigation.index()}
-    pictures = {file.relative_to(docs).as_posix() for kind in ("png", "svg", "gif") for file in docs.rglob(f"*.{kind}")}
-    for name in sorted(pictures):
+    kinds = ("png", "svg", "gif", "yml")
+    files = {file.relative_to(docs).as_posix() for kind in kinds for file in docs.rglob(f"*.{kind}")}
+    for name in sorted(files):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(docs / name, folder / name)
-    known = {*pages, *made, *pictures}
+    known = {*pages, *made, *files}
     for name, file in pages.items():
         made[name] = with_links(file.read_text(encoding="utf-8"), file.relative_to(ROOT).as_posix(), name, known)
     made["publications.md"] += reference_pages.sources_of_personas()
