@@ -8,6 +8,7 @@ import itertools
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import sysconfig
@@ -16,10 +17,12 @@ from pathlib import Path
 from typing import get_args
 
 import pytest
+import yaml
 
+from harness.errors import NOT_ACCEPTED
 from harness.shipped_documents import Kind, shipped_names, shipped_policies
 from tests.support.repository import REPOSITORY
-from tests.support.shipped import FOLDER, NAIVE_BY_NAME, PERSON_BY_NAME, SPEEDY, TWO_GAMES
+from tests.support.shipped import FOLDER, NAIVE_BY_NAME, PERSON_BY_NAME, RETRAINED, SPEEDY, TWO_GAMES
 from tests.support.sources import SOURCES, tree_of
 
 if sys.version_info >= (3, 11):
@@ -67,10 +70,11 @@ def environment(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def run(
-    environment: Path, folder: Path, program: str, *arguments: str, expected: int = 0
+    environment: Path, folder: Path, program: str, *arguments: str, expected: int = 0, **variables: str
 ) -> subprocess.CompletedProcess[str]:
     """Run a program of the environment in a folder, with no path to the checkout."""
-    variables = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "VIRTUAL_ENV")}
+    inherited = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "VIRTUAL_ENV")}
+    variables = inherited | variables
     variables["NUMBA_CACHE_DIR"] = str(environment / "compiled")  # of no use to anything else
     command = [environment / "bin" / program, *arguments]
     done = subprocess.run(command, cwd=folder, env=variables, capture_output=True, text=True, timeout=600)
@@ -124,6 +128,49 @@ def test_wheel__plays_a_campaign_with_the_shipped_policies(environment: Path, tm
     # the test that a user writes, on the same run folder
     (tmp_path / "test_mine.py").write_text(USER_TEST, encoding="utf-8")
     run(environment, tmp_path, "python", "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_mine.py")
+
+
+# --- the workflow for the repository of an ego -----------------------------------------------------------------------
+
+WORKFLOW = REPOSITORY / "docs" / "ci" / "harness.yml"
+
+
+def test_workflow__its_actions_have_versions() -> None:
+    used = re.findall(r"uses: (\S+)", WORKFLOW.read_text(encoding="utf-8"))
+    assert len(used) == 3
+    assert [each for each in used if not re.fullmatch(r"actions/[\w-]+@v\d+", each)] == []
+
+
+def test_workflow__each_of_its_commands_does_what_it_says(environment: Path, tmp_path: Path) -> None:
+    """In the repository of the tutorial's ego, which fails in game 1 of its campaign; that game is pinned."""
+    (job,) = yaml.safe_load(WORKFLOW.read_text(encoding="utf-8"))["jobs"].values()
+    install, check, campaign, pinned = [step["run"] for step in job["steps"] if "run" in step]
+    tutorial = (REPOSITORY / "docs" / "tutorials" / "your-own-ego.md").read_text(encoding="utf-8")
+    ego, document = re.findall(r"^```toml\n(.*?)^```", tutorial, re.DOTALL | re.MULTILINE)
+    (tmp_path / "mine.toml").write_text(ego, encoding="utf-8")
+    bounded = document.replace("episodes = 20", "episodes = 2") + "\n[acceptance]\nfailure_rate = 0.99\n"
+    (tmp_path / "campaign.toml").write_text(bounded, encoding="utf-8")
+    shutil.copyfile(REPOSITORY / "requirements.lock", tmp_path / "requirements.lock")
+    (wheel,) = environment.parent.glob("*.whl")
+    (tmp_path / "wheels").mkdir()
+    shutil.copyfile(wheel, tmp_path / "wheels" / wheel.name)
+    path = f"{environment / 'bin'}:{Path(sys.prefix) / 'bin'}:{os.environ['PATH']}"
+    # whichever pip the path has, it installs into the environment of the wheel, and from nowhere else
+    pip = {"PIP_PYTHON": str(environment / "bin" / "python"), "PIP_NO_INDEX": "1"}
+
+    def step(command: str, ego: str = "mine.toml", expected: int = 0) -> str:
+        bash = ("/bin/bash", "-e", "-c", command)
+        variables = {"PATH": path, "EGO": ego, "NUMBA_DISABLE_JIT": "1"}  # compiling takes longer than these games
+        return run(environment, tmp_path, *bash, expected=expected, **variables, **pip).stdout
+
+    assert wheel.name in step(install)
+    assert "assess naive_vs_paper_speedy-seed11" in step(check)
+    assert "PASS  failures, paper_speedy" in step(campaign)
+    assert (tmp_path / "reports" / "my_ego" / "report.html").is_file()
+    step('harness minimise reports/my_ego naive_vs_paper_speedy 1 --ego "$EGO" --out pinned')
+    assert "0 of 1 pinned games pass" in step(pinned, expected=NOT_ACCEPTED)
+    assert "1 of 1 pinned games pass" in step(pinned, ego=f"{FOLDER}/{RETRAINED}")
+    assert 'tests="1" failures="0"' in (tmp_path / "reports" / "pinned.xml").read_text(encoding="utf-8")
 
 
 # --- metadata ---------------------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""The table of docs/personas.md: training, characteristic and effect of every persona of a run.
+"""The table of docs/personas-on-the-merge.md: training, characteristic and effect of every persona of a run.
 
     python docs/personas/table.py reports/merge-personas
 

@@ -1,26 +1,72 @@
-"""The pictures of the documents: the shipped scenes, as `harness scene show --html` shows them in a browser, and the
-first screen of the published report.
+"""The pictures of the documents: pages in a browser, without a screen.
 
     python docs/publish/pictures.py [NAME...]
 
-writes docs/scenes/<scene>.png for the scenes that it names, and docs/report.png for `report`; without a name, all of
-them. It needs Chromium and the extra `dev`.
+takes those of a shipped scene (drawn by `harness scene show`), of the published report (`report`), or of a tutorial
+after its steps; without a name, all of them. It needs Chromium and the extra `dev`.
 """
 
 from __future__ import annotations
 
+import io
 import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
-from playwright.sync_api import sync_playwright
+from PIL import Image
+from playwright.sync_api import ViewportSize, sync_playwright
+from tutorial_steps import carry_out
 
 ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
 SCENES = ("left_across", "priority_crossing", "red_light", "roundabout", "crossing", "zebra", "cyclist")
-REPORT = "report"
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
+COLOURS = 256
+
+
+class Picture(NamedTuple):
+    """What a browser's window shows of a page."""
+
+    file: str
+    """Of the picture, below docs/."""
+    page: str
+    """Where the page is, and after a # the part of it."""
+    width: int = 1280
+    height: int = 800
+    keys: tuple[str, ...] = ()
+    """What is pressed on the page before."""
+
+
+PUBLISHED = {
+    "report": (Picture("report.png", "reports/paper_merge/report.html"),),
+    "reading-a-report": (
+        Picture("tutorials/card.png", "reports/paper_merge/report.html#persona-1", 1280, 620),
+        Picture("tutorials/player.png", "reports/paper_merge/report.html#game=naive_vs_paper_speedy,11,29", 1280, 760),
+    ),
+}
+"""Pictures of pages in the repository."""
+TUTORIALS = {
+    "first-campaign": (Picture("tutorials/first-campaign.png", "lab/reports/lab-quick/report.html"),),
+    "your-own-ego": (Picture("tutorials/your-own-ego.png", "reports/my_ego/report.html", 1280, 680),),
+    "from-a-failure-to-a-regression-test": (
+        Picture("tutorials/failure.png", "reports/my_ego/report.html#game=naive_vs_paper_speedy,11,5", 1280, 760),
+    ),
+    "your-own-person": (
+        Picture("tutorials/late_lee.png", "late_lee.html", 1280, 760),
+        Picture("tutorials/lee.png", "reports/lee-quick/report.html"),
+    ),
+    "your-own-junction": (
+        Picture("tutorials/conflicts.png", "net.html", 900, 600, keys=("Tab", *"+++++++++")),
+        Picture("tutorials/your-own-junction.png", "crossing.html", 900, 600),
+    ),
+}
+"""Pictures of pages that the steps of a tutorial write."""
+CONTINUED = {"from-a-failure-to-a-regression-test": "your-own-ego"}
+"""Tutorials that go on in the folder of another."""
 
 
 def main() -> None:
@@ -30,23 +76,47 @@ def main() -> None:
         sys.exit(f"none of {', '.join(CHROMIUM)} is installed")
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=browser_file, args=["--no-sandbox"])
-        for name in sys.argv[1:] or (*SCENES, REPORT):
-            if name == REPORT:
-                page, picture, size = ROOT / "reports/paper_merge/report.html", ROOT / "docs/report.png", (1280, 800)
-            else:
-                page, picture, size = _drawn(name, Path(folder)), ROOT / f"docs/scenes/{name}.png", (900, 560)
-            tab = browser.new_page(viewport={"width": size[0], "height": size[1]})
-            tab.goto(page.as_uri())
-            tab.screenshot(path=picture)
-            tab.close()
+        for name in sys.argv[1:] or [*SCENES, *PUBLISHED, *TUTORIALS]:
+            for picture, page in pages_of(name, Path(folder)):
+                size: ViewportSize = {"width": picture.width, "height": picture.height}
+                tab = browser.new_page(viewport=size, reduced_motion="reduce")  # nothing plays by itself
+                tab.goto(page)
+                tab.wait_for_timeout(500)  # the page opens the game that its address names
+                for key in picture.keys:
+                    tab.keyboard.press(key)
+                (DOCS / picture.file).write_bytes(smaller(tab.screenshot()))
+                tab.close()
         browser.close()
 
 
-def _drawn(scene: str, folder: Path) -> Path:
-    page = folder / f"{scene}.html"
-    show = [sys.executable, "-m", "harness.cli.main", "scene", "show", f"networks/{scene}", "--html", str(page)]
-    subprocess.run(show, cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
-    return page
+def pages_of(name: str, folder: Path) -> Iterator[tuple[Picture, str]]:
+    """The pictures of a name with the addresses of their pages, which are written into a folder if need be."""
+    if name in SCENES:
+        pictures: tuple[Picture, ...] = (Picture(f"scenes/{name}.png", f"{name}.html", 900, 560),)
+        place = folder
+        show = [sys.executable, "-m", "harness.cli.main", "scene", "show", f"networks/{name}"]
+        subprocess.run([*show, "--html", folder / f"{name}.html"], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+    elif name in PUBLISHED:
+        pictures, place = PUBLISHED[name], ROOT
+    else:
+        first = CONTINUED.get(name, name)
+        pictures, place = TUTORIALS[name], folder / first
+        if not place.exists():
+            place.mkdir()
+            carry_out(first, place)
+        if name != first:
+            carry_out(name, place)
+    for picture in pictures:
+        file, _, part = picture.page.partition("#")
+        yield picture, (place / file).as_uri() + (f"#{part}" if part else "")
+
+
+def smaller(png: bytes) -> bytes:
+    """A picture with a palette: a page has few colours."""
+    out = io.BytesIO()
+    with Image.open(io.BytesIO(png)) as picture:
+        picture.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(out, "png", optimize=True)
+    return out.getvalue()
 
 
 if __name__ == "__main__":

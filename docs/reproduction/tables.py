@@ -1,4 +1,4 @@
-"""The table of the levers in docs/reproduction.md, as Markdown.
+"""The table of the levers in docs/reproduction-assumptions.md, as Markdown.
 
 python docs/reproduction/tables.py docs/reproduction/levers.csv
 """

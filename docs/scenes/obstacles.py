@@ -2,7 +2,7 @@
 
     python docs/scenes/obstacles.py
 
-lets 60 vehicles depart on a road of 600 m, one every 2.5 s on a random lane, and prints the table of docs/scenes.md:
+lets 60 vehicles depart on a road of 600 m, one every 2.5 s on a random lane, and prints the table of docs/junctions.md:
 how many of them have arrived after 180 s, and how many passed through the place of the obstacle.
 """
 

@@ -2,7 +2,7 @@
 
     python docs/scenes/reaction.py networks/crossing networks/zebra
 
-plays 40 games per row, with SUMO's driver as the ego, and prints the table of docs/scenes.md.
+plays 40 games per row, with SUMO's driver as the ego, and prints the table of docs/people-on-foot.md.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
 The pages are the Markdown files of docs/, the README, the changelog, and pages made from the code (`reference_pages`).
 They are copied to a folder of their own, because Sphinx reads one tree, and their links are led to where their targets
-are on the site. A link to a file that is no page, such as `../campaigns/merge.toml`, becomes plain text.
+are on the site. A published report is on the site as it is. A link to another file that is no page, such as
+`../campaigns/merge.toml`, becomes plain text.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ import reference_pages
 ROOT = Path(__file__).resolve().parents[2]
 FROM_ROOT = {"README.md": "readme.md", "CHANGELOG.md": "changelog.md", "CONTRIBUTING.md": "contributing.md"}
 """Pages of the site that lie at the top of the checkout."""
+LIVE = "reports/paper_merge"
+"""A published run folder: its report, with the files that the report links to."""
 _LINK = re.compile(r"(!?)\[((?:[^\[\]]|!?\[[^\]]*\]\([^)]*\)|\[[^\]]*\])*)\]\(([^)\s]+)\)")
 _FENCE = re.compile(r"(^ *```.*?^ *```|`[^`\n]+`)", re.DOTALL | re.MULTILINE)
 
@@ -30,7 +33,8 @@ def build(out: Path) -> None:
     """Build the site into a folder. Raises CalledProcessError if Sphinx warns, FileNotFoundError for a broken link."""
     with tempfile.TemporaryDirectory(prefix="harness-site-") as folder:
         source = Path(folder)
-        write_source(source)
+        write_source(source / "pages")
+        copy_files(ROOT / LIVE, source / "live" / LIVE)
         command = [
             sys.executable,
             "-m",
@@ -43,20 +47,30 @@ def build(out: Path) -> None:
             "-c",
             str(ROOT / "docs/site"),
         ]
-        subprocess.run([*command, "-d", str(source / ".doctrees"), str(source), str(out)], check=True)
+        settings = ["-D", f"html_extra_path={source / 'live'}", "-d", str(source / "doctrees")]
+        subprocess.run([*command, *settings, str(source / "pages"), str(out)], check=True)
+
+
+def copy_files(folder: Path, out: Path) -> None:
+    """Copy the files that lie in a folder itself."""
+    out.mkdir(parents=True)
+    for file in folder.iterdir():
+        if file.is_file():
+            shutil.copyfile(file, out / file.name)
 
 
 def write_source(folder: Path) -> None:
-    """Write every page and picture of the site into a folder."""
+    """Write every page, picture and file to copy of the site into a folder."""
     docs = ROOT / "docs"
     pages = {name.relative_to(docs).as_posix(): name for name in sorted(docs.rglob("*.md"))}
     pages |= {site: ROOT / name for name, site in FROM_ROOT.items()}
     made = reference_pages.pages(docs / "schemas") | {"index.md": navigation.index()}
-    pictures = {file.relative_to(docs).as_posix() for kind in ("png", "svg", "gif") for file in docs.rglob(f"*.{kind}")}
-    for name in sorted(pictures):
+    kinds = ("png", "svg", "gif", "yml")
+    files = {file.relative_to(docs).as_posix() for kind in kinds for file in docs.rglob(f"*.{kind}")}
+    for name in sorted(files):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(docs / name, folder / name)
-    known = {*pages, *made, *pictures}
+    known = {*pages, *made, *files}
     for name, file in pages.items():
         made[name] = with_links(file.read_text(encoding="utf-8"), file.relative_to(ROOT).as_posix(), name, known)
     made["publications.md"] += reference_pages.sources_of_personas()
@@ -77,6 +91,10 @@ def with_links(text: str, origin: str, page: str, known: Set[str]) -> str:
         if not path or re.match(r"[a-z]+:", target):
             return match.group()
         place = posixpath.normpath(posixpath.join(posixpath.dirname(origin), path))
+        if place == f"{LIVE}/report.html":  # Sphinx makes a download of it if it is a link of Markdown
+            return f'<a href="{posixpath.relpath(place, posixpath.dirname(page) or ".")}">{words}</a>'
+        if schema := re.fullmatch(r"docs/schemas/(\w+)\.schema\.json", place):
+            place = f"docs/reference/{schema[1]}.md"
         on_site = FROM_ROOT.get(place, place.removeprefix("docs/"))
         if on_site in known:
             link = posixpath.relpath(on_site, posixpath.dirname(page) or ".")

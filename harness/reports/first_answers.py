@@ -85,7 +85,7 @@ def _why(focus: Focus | None, tables: RunTables) -> Iterator[str]:
 
 def _prevented(persona: str, tables: RunTables) -> Iterator[str]:
     """What the driver of the regulation prevents against a persona, for each ego that fails."""
-    clauses = []
+    clauses, not_judged = [], []
     for _, made, arm in egos_of(persona, tables):
         failed, _ = _count(arm, tables)
         judged = tables.prevented_in(arm)
@@ -93,9 +93,11 @@ def _prevented(persona: str, tables: RunTables) -> Iterator[str]:
         if failed and judged:
             clauses.append(f"{conflict} of {failed} of the {made} from the conflict on, {start} from the start")
         elif failed:
-            clauses.append(f"those of the {made} are not judged")
+            not_judged.append(made)
     if clauses:
         yield f"Of the failures against {persona} the driver of UN R157 prevents {'; '.join(clauses)}."
+    for made in not_judged:
+        yield f"The failures of the {made} against {persona} are not judged."
 
 
 def _severe(persona: str, tables: RunTables) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""The script of the table in docs/personas.md: its measures against values computed by hand, and its table of a run."""
+"""The script of docs/personas-on-the-merge.md: measures against values computed by hand, and its table of a run."""
 
 from __future__ import annotations
 

@@ -46,6 +46,13 @@ def test_reference__has_every_public_name_command_and_key(site: Path) -> None:
     assert all(key in campaign for key in ("personas", "early_convergence", "failure_rate_alone"))
 
 
+def test_first_page__begins_with_a_film_and_leads_to_a_report_that_is_on_the_site(site: Path) -> None:
+    page = (site / "index.html").read_text(encoding="utf-8")
+    assert page.index("merge-naive.gif") < page.index("<h2>")
+    (report,) = re.findall(r'<a href="(reports/[^"]+)"', page)
+    assert 'id="player"' in (site / report).read_text(encoding="utf-8")
+
+
 @pytest.fixture(scope="module")
 def notebooks(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("notebooks")

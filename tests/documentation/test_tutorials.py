@@ -39,7 +39,7 @@ def test_tutorial__its_documents_are_valid(page: Path) -> None:
 
 @each_tutorial
 def test_tutorial__its_commands_exist(page: Path) -> None:
-    for line in "".join(blocks(page, "sh")).splitlines():
+    for line in "".join(blocks(page, "sh")).replace("\\\n", "").splitlines():
         words = shlex.split(line, comments=True)
         if words[:1] != ["harness"]:
             continue

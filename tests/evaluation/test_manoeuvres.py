@@ -401,8 +401,8 @@ def test_paper__a_distracted_drift_an_egos_swerve_and_the_rail(merge: OpenScene,
 
 
 def test_docs__state_every_rule_and_number(repository: Path) -> None:
-    page = (repository / "docs" / "manoeuvres.md").read_text(encoding="utf-8")
-    stated = {name: float(value) for name, value in re.findall(r"^\| `([A-Z_0-9]+)` \| ([0-9.]+) \|", page, re.M)}
+    rules, table = ((repository / "docs" / f"manoeuvre{name}.md").read_text("utf-8") for name in ("s", "-numbers"))
+    stated = {name: float(value) for name, value in re.findall(r"^\| `([A-Z_0-9]+)` \| ([0-9.]+) \|", table, re.M)}
     numbers = {name: value for name, value in vars(thresholds).items() if name.isupper()}
     assert stated == {name: pytest.approx(value, rel=5e-3) for name, value in numbers.items()}
-    assert re.findall(r"^\| `([a-z_]+)` \|", page, re.M) == list(NAMES)
+    assert re.findall(r"^\| `([a-z_]+)` \|", rules, re.M) == list(NAMES)

@@ -150,7 +150,11 @@ def test_answers__say_how_often_each_ego_fails_and_what_retraining_costs():
     ]
     assert given["Could it have been prevented?"] == [
         "Of the failures against speedy the driver of UN R157 prevents 12 of 18 of the naive ego from the conflict on, "
-        "1 from the start; those of the retrained ego are not judged."
+        "1 from the start.",
+        "The failures of the retrained ego against speedy are not judged.",
+    ]
+    assert answers(run_of())["Could it have been prevented?"] == [
+        f"The failures of the {ego} ego against speedy are not judged." for ego in ("naive", "retrained")
     ]
     (line,) = given["Does retraining help, and what does it cost?"]
     assert line.startswith("Against speedy: yes. 18 of 60 failures become 2 of 60; ")
