@@ -6,6 +6,7 @@ every arm of every training seed.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -69,6 +70,10 @@ class Game:
     def recorded(self) -> RecordedGame | None:
         """The game as its trace tells it."""
         return recorded_game(pd.DataFrame(self.trace), self.scene) if self.trace is not None else None
+
+    def payoff_of(self, player: int) -> float:
+        """The payoff of a player, equation 1 of the paper; NaN if the game could not be played."""
+        return float(self.recorded.payoff[:, player].sum()) if self.recorded is not None else math.nan
 
     @cached_property
     def record(self) -> dict[str, Any]:

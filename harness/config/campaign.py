@@ -60,7 +60,9 @@ class Crowd(Document):
 
 
 class Rounds(Document):
-    """Iterated best response: non-ego and ego are trained against each other in turn."""
+    """Iterated best response: non-ego and ego are trained against each other in turn. After each training from round 3
+    on, the player goes on with the best of its new policy and all its earlier ones, by as many games as an arm has,
+    none of which is a game of the assessment."""
 
     count: int = Field(2, ge=2, le=20)
     """Number of the last round. The non-ego learns in odd rounds, the ego in even rounds. The paper has 2 rounds."""

@@ -67,6 +67,16 @@ class PersonaNonEgo:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Answer:
+    """What the training of a later round made of a player, before a selection took or rejected it."""
+
+    of: RetrainedEgo | PersonaNonEgo
+    """The player's strategy of that round: the answer where it was taken, else a policy that the player had before."""
+    is_rejected: bool = False
+    """Whether it plays in an arm: only a rejected answer does, under that name."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class BestResponse:
     """One training of a player's best response to the other player of an arm."""
 
@@ -75,8 +85,8 @@ class BestResponse:
     start: int
 
 
-EgoStrategy = NaiveEgo | RetrainedEgo | ReconfiguredEgo | RobustEgo | OtherEgo
-NonEgoStrategy = SumoNonEgo | PersonaNonEgo
+EgoStrategy = NaiveEgo | RetrainedEgo | ReconfiguredEgo | RobustEgo | OtherEgo | Answer
+NonEgoStrategy = SumoNonEgo | PersonaNonEgo | Answer
 Strategy = EgoStrategy | NonEgoStrategy | BestResponse
 
 
@@ -153,6 +163,8 @@ def strategy_name(strategy: Strategy) -> str:
             return "sumo"
         case PersonaNonEgo(persona=persona, round=round_, borrowed=borrowed):
             return persona + (f"_round{round_}" if round_ > 1 else "") + _borrowed_name(borrowed)
+        case Answer(of=of, is_rejected=is_rejected):
+            return f"{strategy_name(of)}_{'rejected' if is_rejected else 'answer'}"
         case BestResponse(arm=arm, start=start):
             return f"{arm.name}{start}"
 
@@ -169,6 +181,8 @@ def player_of(strategy: Strategy) -> int:
         case BestResponse(arm=arm):
             assert arm.best_response_of is not None
             return arm.best_response_of
+        case Answer(of=of):
+            return player_of(of)
         case SumoNonEgo() | PersonaNonEgo():
             return NON_EGO
         case _:
@@ -182,6 +196,8 @@ def round_of(strategy: Strategy) -> int:
             return round_
         case ReconfiguredEgo():
             return PAPER_ROUNDS
+        case Answer(of=of):
+            return round_of(of)
         case _:
             return 0
 

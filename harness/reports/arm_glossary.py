@@ -5,6 +5,7 @@ from __future__ import annotations
 from harness.config.traits import TRAITS
 from harness.evaluation.strategies import (
     ATTENTIVE,
+    Answer,
     Arm,
     Borrowed,
     EgoStrategy,
@@ -56,6 +57,8 @@ def _non_ego_in_words(non_ego: NonEgoStrategy) -> str:
             return f"the non-ego {persona} with its eyes on the road"
         case PersonaNonEgo(persona=persona, borrowed=Borrowed(trait=trait, of=of)):
             return f"the non-ego {persona} with the {TRAITS[trait].words} of {of}"
+        case Answer(of=of):
+            return f"the rejected answer of the non-ego {strategy_name(of)}"
         case _:
             return f"the non-ego {strategy_name(non_ego)}"
 
@@ -68,5 +71,7 @@ def _ego_in_words(ego: EgoStrategy, naive: str) -> str:
             return f"the ego tuned against {against}"
         case RetrainedEgo(against=against, round=2):
             return f"the ego retrained against {against}"
+        case Answer(of=of):
+            return f"the rejected answer of the ego {strategy_name(of)}"
         case _:
             return f"the ego {strategy_name(ego)}"

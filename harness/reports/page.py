@@ -28,6 +28,7 @@ from harness.reports.page_template import CONTENT_POLICY, ELSEWHERE, LIBRARIES, 
 from harness.reports.provenance import QUICK, asked_alone, command_of, facts, made_by, mixed_versions
 from harness.reports.run_tables import RunTables, unplayed
 from harness.reports.scope_wording import planned_in_words
+from harness.reports.selection_wording import selection_sentences
 
 MOST_ROWS = 10_000
 """The page leaves out a longer table of games and refers to its CSV file."""
@@ -40,6 +41,7 @@ CAPTIONS = {
     "training": "A row per window of a learning curve.",
     "episodes": "A row per game.",
     "reconfiguration": "A row per trial and parameter of a search.",
+    "selections": "A row per candidate of each selection; the last one is the new answer.",
 }
 """Of the tables that are shown as the CSV files have them."""
 REPLAYS_SHOWN = 12
@@ -98,6 +100,7 @@ def render_page(
         glossary=glossary(tables),
         versions=tables.manifest.get("versions", {}),
         game=game_section(tables.game, links),
+        selections=selection_sentences(tables.selections),
         human_rows=human_ranges.human_rows(tables.realism),
         human_headline=human_ranges.headline(tables.realism),
         human_plots=human_ranges.plots(tables.realism),

@@ -13,9 +13,11 @@ from harness.assessment.continuation import Continuation
 from harness.campaign.plan.stages import (
     AssessmentStage,
     BestOf,
+    EquilibriumGate,
     External,
     PreventabilityStage,
     SearchStage,
+    SelectionStage,
     Stage,
     TrainingStage,
     borrowed_of,
@@ -65,7 +67,7 @@ def _inputs(campaign: OpenCampaign, stage: Stage) -> dict[str, Any]:
             inputs["continuations"] = [each.value for each in Continuation]
         case _:
             inputs["episodes"] = document.assessment.episodes
-    if isinstance(stage, AssessmentStage | PreventabilityStage) and stage.seed != document.start_seed:
+    if isinstance(stage, AssessmentStage | SelectionStage | PreventabilityStage) and stage.seed != document.start_seed:
         inputs["start_seed"] = document.start_seed  # that of the first training seed is in the stage
     if campaign.policies is not None and stage.reads:
         others = campaign.policy_drivers
@@ -77,7 +79,7 @@ def _inputs(campaign: OpenCampaign, stage: Stage) -> dict[str, Any]:
         inputs["others"] = {name: campaign.other_egos[name].identity for name in crossplay}
     if any(isinstance(each, BestOf) for each in stage.drivers):
         inputs["choice_episodes"] = document.assessment.episodes
-    if stage.gates:
+    if any(isinstance(gate, EquilibriumGate) for gate in stage.gates):
         inputs["significance"] = document.assessment.significance
         inputs["competence"] = document.competence.record()
     return inputs

@@ -58,8 +58,12 @@ class PlayerFactory:
 
     def arm(self, stage: AssessmentStage) -> SeatedArm:
         """The arm of an assessment. A `BestOf` in it has to be `chosen` first."""
-        drivers = (self.player(driver_in(stage.ego, 0)), *self.people(stage.non_ego))
-        return SeatedArm(name=stage.name, scene=self.scene, drivers=drivers, seed=self.context.document.start_seed)
+        return self.seated(stage.name, stage.ego, stage.non_ego)
+
+    def seated(self, name: str, ego: Side, non_ego: Side) -> SeatedArm:
+        """The two sides of an arm, with drivers that are made anew."""
+        drivers = (self.player(driver_in(ego, 0)), *self.people(non_ego))
+        return SeatedArm(name=name, scene=self.scene, drivers=drivers, seed=self.context.document.start_seed)
 
     def people(self, side: Side) -> tuple[Mixture | None, ...]:
         """The drivers in each place of the non-egos, each made anew."""
@@ -94,8 +98,8 @@ class PlayerFactory:
             sides = [*stage.sides]
             sides[learner] = (member,)
             candidates.append(replace(stage, ego=sides[0], non_ego=sides[1]))
-            played = (game.recorded for game in assess(self.arm(candidates[-1]), games))
-            measured = [float(game.payoff[:, learner].sum()) for game in played if game is not None]
+            payoffs = (game.payoff_of(learner) for game in assess(self.arm(candidates[-1]), games))
+            measured = [payoff for payoff in payoffs if np.isfinite(payoff)]
             if not measured:
                 raise StageFailed(f"{stage.id}: none of the games that choose the best response could be played")
             earned.append(float(np.mean(measured)))

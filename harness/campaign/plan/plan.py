@@ -14,7 +14,16 @@ from harness.campaign.plan.stages import AssessmentStage, PreventabilityStage, S
 from harness.campaign.plan.strategy_stages import SeedStages, crossplay_name, ego_learns
 from harness.config.campaign import Campaign
 from harness.config.traits import UNREAD, PersonTraits
-from harness.evaluation.strategies import EgoStrategy, OtherEgo, ReconfiguredEgo, RetrainedEgo, RobustEgo
+from harness.evaluation.strategies import (
+    Answer,
+    EgoStrategy,
+    OtherEgo,
+    PersonaNonEgo,
+    ReconfiguredEgo,
+    RetrainedEgo,
+    RobustEgo,
+)
+from harness.game.roles import EGO, NON_EGO
 
 
 def plan(
@@ -23,7 +32,8 @@ def plan(
     """Every stage of a campaign with these personas, each after those it needs.
 
     `tunable`: the campaign's ego is external and has tunable parameters. `traits`: those of the personas. A
-    campaign with a folder of policies trains nothing but best responses.
+    campaign with a folder of policies trains nothing but best responses, and has the player of each round from there:
+    nothing is selected.
     """
     seeds = [SeedStages(campaign=campaign, seed=seed, traits=traits) for seed in campaign.seeds]
     stages = [stage for of in seeds for stage in _plan_seed(of, personas, tunable)]
@@ -73,7 +83,9 @@ def _plan_crossplay(of: SeedStages, rounds: Sequence[PersonaRounds]) -> list[Ass
         return []
     egos = dict.fromkeys(ego for each in rounds for ego in each.egos)
     egos |= dict.fromkeys(_egos_of_no_persona(of.campaign, has_round_2=len(egos) > 1))
-    non_egos = [non_ego for each in rounds for non_ego in each.non_egos]
+    egos |= dict.fromkeys(answer for each in rounds for answer in each.rejected(EGO))
+    non_egos: list[PersonaNonEgo | Answer] = [non_ego for each in rounds for non_ego in each.non_egos]
+    non_egos += [answer for each in rounds for answer in each.rejected(NON_EGO)]
     return [of.pair(ego, non_ego) for ego in egos for non_ego in non_egos]
 
 

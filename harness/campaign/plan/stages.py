@@ -17,7 +17,9 @@ from harness.evaluation.strategies import (
     Arm,
     BestResponse,
     Borrowed,
+    PersonaNonEgo,
     ReconfiguredEgo,
+    RetrainedEgo,
     Strategy,
     player_of,
     strategy_name,
@@ -158,11 +160,26 @@ class EquilibriumGate:
 
 
 @dataclass(frozen=True, kw_only=True)
+class RejectionGate:
+    """A selection: the stages behind the gate are about its new answer, and have nothing to do where it was taken."""
+
+    selection: str
+    answer: str
+
+    @property
+    def stages(self) -> tuple[str, ...]:
+        return (self.selection,)
+
+
+Gate: TypeAlias = EquilibriumGate | RejectionGate
+
+
+@dataclass(frozen=True, kw_only=True)
 class _Stage:
     seed: int
     persona: str
     """The persona or population that the stage belongs to; empty for the naive ego's own."""
-    gates: tuple[EquilibriumGate, ...] = ()
+    gates: tuple[Gate, ...] = ()
 
     kind: ClassVar[str]
     """What the manifest calls it."""
@@ -284,6 +301,44 @@ class SearchStage(_Stage):
 
 
 @dataclass(frozen=True, kw_only=True)
+class SelectionStage(_Stage):
+    """The end of a player's turn in a later round: it goes on with the best of the policies that it has."""
+
+    strategy: RetrainedEgo | PersonaNonEgo
+    """The player's strategy of this round, which the selection makes."""
+    candidates: tuple[Trained, ...]
+    """All policies of the player so far, the oldest first and the new answer last."""
+    opponent: Side
+    """What the training of the answer played against."""
+    alone_share: float
+    """The share of that training's games without the opponent."""
+
+    kind, verb, unit = "selection", "select", "episodes"
+
+    @property
+    def name(self) -> str:
+        return strategy_name(self.strategy)
+
+    @property
+    def learner(self) -> int:
+        """The player (index of `ROLES`) that goes on."""
+        return player_of(self.strategy)
+
+    @property
+    def round(self) -> int:
+        return self.strategy.round
+
+    @property
+    def answer(self) -> Trained:
+        """The policy of this round's training."""
+        return self.candidates[-1]
+
+    @property
+    def drivers(self) -> tuple[PlannedDriver, ...]:
+        return (*self.candidates, *self.opponent)
+
+
+@dataclass(frozen=True, kw_only=True)
 class PreventabilityStage(_Stage):
     """The judgement of an arm's failures: which of them the reference drivers prevent."""
 
@@ -305,7 +360,7 @@ class PreventabilityStage(_Stage):
         return (self.of.id, *super().needs)
 
 
-Stage = TrainingStage | AssessmentStage | SearchStage | PreventabilityStage
+Stage = TrainingStage | AssessmentStage | SearchStage | SelectionStage | PreventabilityStage
 
 
 def stage_id(name: str, seed: int) -> str:

@@ -50,6 +50,7 @@ def evaluated(run: ReadRun) -> RunTables:
         over_trainings=compare_over_trainings(asked, run.episodes, significance),
         training=_with_ends(run.training, entries),
         reconfiguration=run.reconfiguration,
+        selections=run.selections,
         manoeuvres=run.manoeuvres,
         causes=run.causes,
         realism=found,
@@ -82,6 +83,7 @@ def csv_tables(run: ReadRun, tables: RunTables) -> dict[str, pd.DataFrame]:
     names += ["over_trainings"] if len(tables.over_trainings) else []
     names += ["populations"] if run.campaign.population else []
     names += ["reconfiguration"] if is_tuned(run.manifest) else []
+    names += ["selections"] if len(run.selections) else []
     found = {"conduct": run.conduct} | {name: getattr(tables, name) for name in names}
     return found | (tables.game.tables if tables.game is not None else {})
 
