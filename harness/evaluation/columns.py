@@ -26,10 +26,12 @@ from harness.evaluation.over_trainings_columns import OVER_TRAININGS
 from harness.evaluation.preventability_columns import PREVENTABILITY, REFERENCE_DRIVERS
 from harness.evaluation.selection_columns import SELECTIONS
 from harness.evaluation.severity.closeness import CRITERIA
+from harness.evaluation.shield_columns import SHIELDS
 
 _T = "95 % t interval"
 _PAPER = "the paper, section 4.2"
 ARM = Column("arm", TEXT, "The name of the arm, such as naive_vs_speedy.")
+_SHIELDED_ARM = replace(ARM, name="shielded_arm", meaning="The same with the shield.")
 PERSONA = Column("persona", TEXT, "The persona of the non-ego; of an arm with one.")
 SEED = Column("seed", COUNT, "The training seed.")
 EPISODE = Column("episode", COUNT, "The game. Equal numbers begin alike in every arm and for every training seed.")
@@ -222,6 +224,7 @@ _TABLES = {
         Column("stopped", TEXT, "In the last row of a training: `converged`, `budget` or `did not learn`."),
     ),
     "selections": (PERSONA, SEED, *SELECTIONS),
+    "shields": (ARM, _SHIELDED_ARM, PERSONA, SEED, *_PAIRS, *SHIELDS),
     "populations": (
         ARM,
         Column("population", TEXT, "The population that drove against the ego."),

@@ -19,7 +19,7 @@ from harness.reports.embedding import GameTracks, embedded_games, recorded_docum
 from harness.reports.failing_paths import FailingPath
 from harness.reports.failure_table import failure_table
 from harness.reports.first_answers import first_answers
-from harness.reports.game import game_section
+from harness.reports.game import game_section, selection_sentences
 from harness.reports.game_links import GameLinks
 from harness.reports.learning import learning, searches, stopped
 from harness.reports.manoeuvres import causes_by_game, failures_by_cause, marks_of
@@ -28,7 +28,6 @@ from harness.reports.page_template import CONTENT_POLICY, ELSEWHERE, LIBRARIES, 
 from harness.reports.provenance import QUICK, asked_alone, command_of, facts, made_by, mixed_versions
 from harness.reports.run_tables import RunTables, unplayed
 from harness.reports.scope_wording import planned_in_words
-from harness.reports.selection_wording import selection_sentences
 
 MOST_ROWS = 10_000
 """The page leaves out a longer table of games and refers to its CSV file."""
@@ -41,6 +40,7 @@ CAPTIONS = {
     "training": "A row per window of a learning curve.",
     "episodes": "A row per game.",
     "reconfiguration": "A row per trial and parameter of a search.",
+    "shields": "A row per arm and training seed: the ego without its shield, and with it, in the same games.",
     "selections": "A row per candidate of each selection; the last one is the new answer.",
 }
 """Of the tables that are shown as the CSV files have them."""

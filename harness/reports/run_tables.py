@@ -76,6 +76,8 @@ class RunTables:
     """Empty: the report has no section on searches."""
     selections: pd.DataFrame = field(default_factory=_empty("selections"))
     """Empty: the campaign has no rounds after the paper's."""
+    shields: pd.DataFrame = field(default_factory=_empty("shields"))
+    """Empty: the ego has no shield."""
     populations: pd.DataFrame = field(default_factory=_empty("populations"))
     causes: pd.DataFrame = field(default_factory=_empty("causes"))
     realism: pd.DataFrame = field(default_factory=_empty("realism"))

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from harness.campaign.execution.player_factory import equilibrium_of
-from harness.campaign.plan.stages import EquilibriumMixture, Trained
+from harness.campaign.plan.planned_drivers import EquilibriumMixture, Trained
 from harness.campaign.storage.run_folder import RunFolder
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import SPEEDY, TEXTING, TRAINING, carried_out, finished, numbers

@@ -10,19 +10,15 @@ from collections.abc import Sequence
 from typing import Any
 
 from harness.assessment.continuation import Continuation
+from harness.campaign.plan.planned_drivers import BestOf, External, Shielded, borrowed_of, members_of, persona_of
 from harness.campaign.plan.stages import (
     AssessmentStage,
-    BestOf,
     EquilibriumGate,
-    External,
     PreventabilityStage,
     SearchStage,
     SelectionStage,
     Stage,
     TrainingStage,
-    borrowed_of,
-    members_of,
-    persona_of,
 )
 from harness.campaign.plan.strategy_stages import training_settings
 from harness.campaign.preflight import OpenCampaign
@@ -77,6 +73,8 @@ def _inputs(campaign: OpenCampaign, stage: Stage) -> dict[str, Any]:
     named = {each.name for each in members_of(*stage.drivers) if isinstance(each, External)}
     if crossplay := sorted(named - {""}):
         inputs["others"] = {name: campaign.other_egos[name].identity for name in crossplay}
+    if any(isinstance(each, Shielded) for each in stage.drivers):
+        inputs["shield"] = reference_identity()["rss"]
     if any(isinstance(each, BestOf) for each in stage.drivers):
         inputs["choice_episodes"] = document.assessment.episodes
     if any(isinstance(gate, EquilibriumGate) for gate in stage.gates):

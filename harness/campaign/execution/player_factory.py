@@ -10,8 +10,7 @@ import numpy as np
 
 from harness.assessment.rollout import SeatedArm, assess
 from harness.campaign.execution.stage_run import RunContext
-from harness.campaign.plan.stages import (
-    AssessmentStage,
+from harness.campaign.plan.planned_drivers import (
     BestOf,
     EquilibriumMixture,
     External,
@@ -19,6 +18,7 @@ from harness.campaign.plan.stages import (
     PlannedDriver,
     PlannedMember,
     Reconfigured,
+    Shielded,
     Side,
     SumoDriven,
     Trained,
@@ -28,6 +28,7 @@ from harness.campaign.plan.stages import (
     driver_in,
     persona_of,
 )
+from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.storage.arm_tables import arm_tables
 from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.trained_policies import DRIVER
@@ -36,9 +37,10 @@ from harness.config.persona import Persona
 from harness.config.traits import with_trait_of
 from harness.config.tunable import Adjustable
 from harness.drivers.car import car_of
-from harness.drivers.mixture import Member, Mixture
+from harness.drivers.mixture import Member, Mixture, mixture_of
 from harness.drivers.policy_file import LearnedDriver, read_policy
 from harness.drivers.protocol import Driver
+from harness.drivers.shield import ShieldedDriver
 from harness.drivers.sumo import SumoDriver
 from harness.errors import StageFailed
 from harness.evaluation.game_theory.nash import NoEquilibrium, equilibrium_shares
@@ -78,6 +80,8 @@ class PlayerFactory:
                 return self._mixture(members, shares)
             case EquilibriumMixture(members=members):
                 return self._mixture(members, equilibrium_of(planned, self.context.folder))
+            case Shielded(members=(member,)):
+                return mixture_of(ShieldedDriver(self.driver(member), self.scene.world), self.persona(member))
             case BestOf():
                 raise TypeError("choose the best with `chosen` first")
             case _:

@@ -23,7 +23,8 @@ from typing import Protocol, TypeAlias
 
 from harness.campaign.execution.schedule import Schedule
 from harness.campaign.execution.stage_run import SEGMENT_EPISODES, Attempt, Emit, Event, Help, RunContext, Task
-from harness.campaign.plan.stages import AssessmentStage, BestOf, PreventabilityStage, SelectionStage, Stage
+from harness.campaign.plan.planned_drivers import BestOf
+from harness.campaign.plan.stages import AssessmentStage, PreventabilityStage, SelectionStage, Stage
 
 MOST_CRASHES = 3
 """Crashes of one segment or game after which it is not tried again."""

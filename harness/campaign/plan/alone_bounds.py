@@ -8,7 +8,6 @@ from harness.campaign.plan.stages import TrainingStage
 from harness.config.campaign import Campaign, ego_called
 from harness.evaluation.competence import AloneBound
 from harness.evaluation.strategies import (
-    Answer,
     Arm,
     BestResponse,
     EgoStrategy,
@@ -17,6 +16,8 @@ from harness.evaluation.strategies import (
     PersonaNonEgo,
     ReconfiguredEgo,
     RetrainedEgo,
+    RoundAnswer,
+    ShieldedEgo,
     Strategy,
     SumoNonEgo,
     strategy_name,
@@ -27,8 +28,8 @@ def alone_bounds(campaign: Campaign, *arms: Arm) -> tuple[AloneBound, ...]:
     """What the players of these arms have to achieve alone, each once.
 
     A population or crowd stands for its members. SUMO's own driver as non-ego, the further egos of a cross-play and
-    rejected answers have no arm alone, and nothing is asked of them. A best response is a change of a player's
-    strategy: its arm asks what the pair asks.
+    rejected answers have no arm alone, and a shielded ego is judged by the one without its shield: nothing is asked of
+    them. A best response is a change of a player's strategy: its arm asks what the pair asks.
     """
     found = [
         bound
@@ -46,7 +47,7 @@ def bound_of(campaign: Campaign, stage: TrainingStage) -> AloneBound | None:
     A best response is trained in games with its opponent only. It is the answer to one opponent, and not a driver for
     the empty road. An answer of a later round is judged by its selection, and the player that goes on by its arm alone.
     """
-    if isinstance(stage.strategy, BestResponse | Answer):
+    if isinstance(stage.strategy, BestResponse | RoundAnswer):
         return None
     (bound,) = _bounds(campaign, stage.strategy)
     return bound
@@ -55,7 +56,7 @@ def bound_of(campaign: Campaign, stage: TrainingStage) -> AloneBound | None:
 def _bounds(campaign: Campaign, strategy: Strategy) -> Iterator[AloneBound]:
     asked = campaign.competence
     match strategy:
-        case SumoNonEgo() | OtherEgo() | BestResponse() | Answer():
+        case SumoNonEgo() | OtherEgo() | BestResponse() | RoundAnswer() | ShieldedEgo():
             return
         case PersonaNonEgo(persona=persona):
             mixed = campaign.mixed_people.get(persona, ())

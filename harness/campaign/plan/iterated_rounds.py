@@ -12,10 +12,10 @@ Heinrich et al. 2015) |
 oracles: Lanctot et al. 2017) |
 
 An answer is never worse than what it answers with. PPO may end anywhere, also below the policy that the player has. So
-each of these trainings is followed by a selection (`SelectionStage`, `evaluation.game_theory.selection`): the player
-goes on with the best of the new answer and all its earlier policies, by games against what the training played against.
-A rejected answer takes part in the cross-play under that name. The paper's rounds 1 and 2 have no selection: a
-retrained ego that is worse than the naive one is their result (RQ2), and nothing to hide.
+a selection (`evaluation.game_theory.policy_selection`) follows each of these trainings: the player goes on with the
+best of the new answer and all its earlier policies, by games against what the training played against. A rejected
+answer takes part in the cross-play under that name. The paper's rounds 1 and 2 have no selection: whether a retrained
+ego is worse than the naive one is their question (RQ2).
 
 With `[best_response]` the rounds of a persona end early, when neither player's best response gains anything
 distinguishable from 0, after searches that do not lack power (`execution.run_stage`): the later stages have nothing to
@@ -33,23 +33,25 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from harness.campaign.plan.alone_bounds import alone_bounds
-from harness.campaign.plan.stages import (
-    AssessmentStage,
+from harness.campaign.plan.planned_drivers import (
     BestOf,
-    EquilibriumGate,
     EquilibriumMixture,
     FixedMixture,
-    Gate,
     PlannedDriver,
-    RejectionGate,
-    SelectionStage,
     Side,
-    Stage,
     Trained,
     TrainedBefore,
-    TrainingStage,
     members_of,
     persona_of,
+)
+from harness.campaign.plan.stages import (
+    AssessmentStage,
+    EquilibriumGate,
+    Gate,
+    RejectionGate,
+    SelectionStage,
+    Stage,
+    TrainingStage,
     stage_id,
 )
 from harness.campaign.plan.strategy_stages import SeedStages, ego_learns
@@ -57,7 +59,6 @@ from harness.config.campaign import Campaign
 from harness.config.training import ATTENTIVE_SHARE
 from harness.evaluation.strategies import (
     PAPER_ROUNDS,
-    Answer,
     Arm,
     BestResponse,
     EgoStrategy,
@@ -65,6 +66,7 @@ from harness.evaluation.strategies import (
     PersonaNonEgo,
     ReconfiguredEgo,
     RetrainedEgo,
+    RoundAnswer,
     player_of,
     round_of,
     strategy_name,
@@ -80,10 +82,10 @@ class PersonaRounds:
     non_egos: list[PersonaNonEgo]
     stages: list[Stage]
 
-    def rejected(self, player: int) -> list[Answer]:
+    def rejected(self, player: int) -> list[RoundAnswer]:
         """The answers of a player that a selection may reject, as they then play in the cross-play."""
         found = [each.strategy for each in self.stages if isinstance(each, SelectionStage)]
-        return [Answer(of=each, is_rejected=True) for each in found if player_of(each) == player]
+        return [RoundAnswer(of=each, is_rejected=True) for each in found if player_of(each) == player]
 
 
 def persona_rounds(of: SeedStages, persona: str, tunable: bool = False) -> PersonaRounds:
@@ -130,7 +132,7 @@ def _plan_round(of: SeedStages, rounds: PersonaRounds, gates: tuple[Gate, ...], 
     opponent, weighing = _opponent(of, others, *before)
     strategy = own[-1]
     assert isinstance(strategy, RetrainedEgo | PersonaNonEgo)
-    answer = Answer(of=strategy)
+    answer = RoundAnswer(of=strategy)
     selected = stage_id(strategy_name(strategy), of.seed)
     rejection = RejectionGate(selection=selected, answer=stage_id(strategy_name(answer), of.seed))
     of.gates[answer] = gates
@@ -167,10 +169,10 @@ def _selections(
     return [selection]
 
 
-def _as_trained(strategy: EgoStrategy | PersonaNonEgo) -> EgoStrategy | PersonaNonEgo | Answer:
+def _as_trained(strategy: EgoStrategy | PersonaNonEgo) -> EgoStrategy | PersonaNonEgo | RoundAnswer:
     """A strategy of a player's rounds as its training made it, whatever was selected after that."""
     if isinstance(strategy, RetrainedEgo | PersonaNonEgo) and round_of(strategy) > PAPER_ROUNDS:
-        return Answer(of=strategy)
+        return RoundAnswer(of=strategy)
     return strategy
 
 

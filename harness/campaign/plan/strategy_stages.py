@@ -8,11 +8,9 @@ from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import PurePath
 
-from harness.campaign.plan.stages import (
-    AssessmentStage,
+from harness.campaign.plan.planned_drivers import (
     External,
     FixedMixture,
-    Gate,
     PlannedDriver,
     PlannedMember,
     Reconfigured,
@@ -20,16 +18,14 @@ from harness.campaign.plan.stages import (
     SumoDriven,
     Trained,
     TrainedBefore,
-    TrainingStage,
     members_of,
     persona_of,
-    stage_id,
 )
+from harness.campaign.plan.stages import AssessmentStage, Gate, TrainingStage, stage_id
 from harness.config.campaign import LEARNED, SUMO, Campaign
 from harness.config.training import ATTENTIVE_SHARE, Training
 from harness.config.traits import PAYOFF, UNREAD, PersonTraits
 from harness.evaluation.strategies import (
-    Answer,
     Arm,
     Borrowed,
     EgoStrategy,
@@ -38,6 +34,7 @@ from harness.evaluation.strategies import (
     OtherEgo,
     PersonaNonEgo,
     ReconfiguredEgo,
+    RoundAnswer,
     SumoNonEgo,
     player_of,
     strategy_name,
@@ -83,9 +80,9 @@ class SeedStages:
         members = tuple(self._driver(PersonaNonEgo(persona=name)) for name in shares)
         return members[0] if len(members) == 1 else FixedMixture(members=members, shares=tuple(shares.values()))
 
-    def pair(self, ego: EgoStrategy, non_ego: PersonaNonEgo | Answer) -> AssessmentStage:
+    def pair(self, ego: EgoStrategy, non_ego: PersonaNonEgo | RoundAnswer) -> AssessmentStage:
         """The assessment of an ego against a person."""
-        person = non_ego.of if isinstance(non_ego, Answer) else non_ego
+        person = non_ego.of if isinstance(non_ego, RoundAnswer) else non_ego
         assert isinstance(person, PersonaNonEgo)
         return self.assessment(Arm(ego=ego, non_ego=non_ego), persona=person.persona)
 
@@ -98,7 +95,7 @@ class SeedStages:
         )
 
     def training(
-        self, strategy: EgoStrategy | PersonaNonEgo | Answer, opponent: Side, *, persona: str = ""
+        self, strategy: EgoStrategy | PersonaNonEgo | RoundAnswer, opponent: Side, *, persona: str = ""
     ) -> TrainingStage:
         """The training of a person, or of an ego after the naive one."""
         campaign, is_person = self.campaign, player_of(strategy) == NON_EGO
@@ -127,9 +124,9 @@ class SeedStages:
             case PersonaNonEgo(persona=persona, borrowed=Borrowed(trait=trait, of=of) as borrowed):
                 policy = PersonaNonEgo(persona=of) if trait == PAYOFF else replace(strategy, borrowed=None)
                 return replace(self._learned(policy, persona), borrowed=borrowed)
-            case Answer(of=of, is_rejected=True):
-                return self._driver(Answer(of=of))
-            case PersonaNonEgo(persona=persona) | Answer(of=PersonaNonEgo(persona=persona)):
+            case RoundAnswer(of=of, is_rejected=True):
+                return self._driver(RoundAnswer(of=of))
+            case PersonaNonEgo(persona=persona) | RoundAnswer(of=PersonaNonEgo(persona=persona)):
                 return self._learned(strategy, persona)
             case _:
                 return self._learned(strategy)

@@ -12,7 +12,8 @@ from typing import Any
 
 import pandas as pd
 
-from harness.campaign.plan.stages import AssessmentStage, Trained
+from harness.campaign.plan.planned_drivers import Trained
+from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.storage.manifest import planned
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign

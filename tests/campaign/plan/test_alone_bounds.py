@@ -12,7 +12,6 @@ from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage, TrainingStage
 from harness.config.campaign import Campaign
 from harness.evaluation.strategies import (
-    Answer,
     Arm,
     BestResponse,
     NaiveEgo,
@@ -21,6 +20,7 @@ from harness.evaluation.strategies import (
     ReconfiguredEgo,
     RetrainedEgo,
     RobustEgo,
+    RoundAnswer,
     SumoNonEgo,
 )
 from tests.support.plans import campaign_of
@@ -111,6 +111,6 @@ def test_trainings__are_judged_by_their_players_arm_alone_except_best_responses_
     assert judged["anna"] == "anna_alone"
     assert judged["retrained_town"] == "retrained_alone_town"
     assert judged["robust"] == "robust_alone"
-    unjudged = {each.name for each in trainings if isinstance(each.strategy, BestResponse | Answer)}
+    unjudged = {each.name for each in trainings if isinstance(each.strategy, BestResponse | RoundAnswer)}
     assert "anna_round3_answer" in unjudged
     assert unjudged == set(bounds) - set(judged)

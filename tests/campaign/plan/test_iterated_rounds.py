@@ -9,20 +9,17 @@ from typing import Any
 import pytest
 
 from harness.campaign.plan.paper_rounds import plan_paper_rounds
-from harness.campaign.plan.stages import (
+from harness.campaign.plan.planned_drivers import (
     BestOf,
-    EquilibriumGate,
     EquilibriumMixture,
     FixedMixture,
-    RejectionGate,
-    SelectionStage,
     Side,
     Trained,
     TrainedBefore,
-    TrainingStage,
     description,
     members_of,
 )
+from harness.campaign.plan.stages import EquilibriumGate, RejectionGate, SelectionStage, TrainingStage
 from harness.campaign.plan.strategy_stages import SeedStages, crossplay_name, training_settings
 from harness.campaign.preflight import open_campaign
 from harness.errors import UsageError
@@ -317,6 +314,7 @@ def test_plan__a_population_is_met_as_a_persona_is(tmp_path: Path) -> None:
         ({"crossplay": {"egos": ["sumo", "sumo"]}}, "crossplay.egos", "two drivers"),
         ({"crossplay": {"egos": ["learned"]}}, "crossplay.egos", "always take part"),
         ({"ego": {"driver": "sumo", "persona": str(CAREFUL)}, "rounds": {"count": 4}}, "rounds.count", "not learn"),
+        ({"ego": {"driver": "sumo", "persona": str(CAREFUL), "shield": "rss"}}, "ego.shield", "SUMO drives this ego"),
         (
             {"ego": {"driver": "sumo", "persona": str(CAREFUL)}, "crossplay": {"egos": ["sumo"]}},
             "crossplay",

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as some
 from hypothesis.extra import numpy as arrays
 
-from harness.evaluation.game_theory.selection import CandidateGames, best_candidate, selection_rows
+from harness.evaluation.game_theory.policy_selection import CandidateGames, best_candidate, selection_rows
 from harness.evaluation.tables import table_of
 from harness.game.arrays import FloatArray
 
