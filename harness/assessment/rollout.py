@@ -6,6 +6,7 @@ every arm of every training seed.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -15,15 +16,17 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 
 from harness.drivers.mixture import Mixture, factors_of, shares_of
+from harness.drivers.shield import ShieldedDriver
 from harness.environments.arena import Arena, Step
 from harness.environments.recorded import recorded_game
 from harness.environments.seats import seats_of
 from harness.errors import is_of_disk
 from harness.evaluation.measured_game import measured
 from harness.evaluation.recorded_game import RecordedGame
-from harness.evaluation.trace_file import SCHEMA
+from harness.evaluation.trace_file import SCHEMA, SHIELDED_SCHEMA
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.initial_state import InitialState, StartDistribution, draw_initial_state
 from harness.game.outcome import Outcome
@@ -45,6 +48,11 @@ class SeatedArm:
     """[P], ego first."""
     seed: int
     """The seed of the starts, `Campaign.start_seed`: not that of the trainings of the drivers."""
+
+    @property
+    def trace_schema(self) -> pa.Schema:
+        """The columns of the traces of its games."""
+        return SHIELDED_SCHEMA if any(map(_shield_of, self.drivers)) else SCHEMA
 
     def present_in(self, episode: int) -> list[bool]:
         """[P] which players take part in an episode."""
@@ -69,6 +77,10 @@ class Game:
     def recorded(self) -> RecordedGame | None:
         """The game as its trace tells it."""
         return recorded_game(pd.DataFrame(self.trace), self.scene) if self.trace is not None else None
+
+    def payoff_of(self, player: int) -> float:
+        """The payoff of a player, equation 1 of the paper; NaN if the game could not be played."""
+        return float(self.recorded.payoff[:, player].sum()) if self.recorded is not None else math.nan
 
     @cached_property
     def record(self) -> dict[str, Any]:
@@ -196,12 +208,19 @@ class StartTrials:
         return start
 
 
+def _shield_of(player: Mixture | None) -> ShieldedDriver | None:
+    """The shield of a player, which then has one driver; None without one."""
+    driver = player.members[0].driver if player is not None else None
+    return driver if isinstance(driver, ShieldedDriver) else None
+
+
 class _Trace:
     """The trace of one game, as columns."""
 
     def __init__(self, arm: SeatedArm, arena: Arena, episode: int) -> None:
         self._arm, self._arena, self._episode = arm, arena, episode
-        self.columns: dict[str, list[Any]] = {name: [] for name in SCHEMA.names}
+        self.columns: dict[str, list[Any]] = {name: [] for name in arm.trace_schema.names}
+        self._shields = [_shield_of(driver) for driver in arm.drivers]
         self._steers = [driver is not None and driver.takes_over for driver in arm.drivers]
 
     def add_players(self, present: BoolArray, step: Step | None = None) -> None:
@@ -216,7 +235,13 @@ class _Trace:
                 steers=self._steers[player],
                 payoff=float(step.payoff[0, player]) if step is not None else 0.0,
                 outcome=Outcome(int(state.outcome[0, player])).word,
+                shielded=self._is_shielded(player, step),
             )
+
+    def _is_shielded(self, player: int, step: Step | None) -> bool:
+        """Whether a player's shield changed its decision in a step."""
+        shield = self._shields[player]
+        return shield is not None and step is not None and bool(step.drove[0, player] and shield.intervenes[0])
 
     def add_others(self) -> None:
         """A row for each vehicle of the background traffic, and for each obstacle."""
@@ -241,5 +266,6 @@ class _Trace:
 
 
 _MOTION = ("x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad", "station_m")
-_NEITHER = dict.fromkeys((*_MOTION, "payoff"), 0.0) | {"lapsed": False, "steers": False, "outcome": ""}
+_NEITHER: dict[str, Any] = dict.fromkeys((*_MOTION, "payoff"), 0.0)
+_NEITHER |= {"lapsed": False, "steers": False, "outcome": "", "shielded": False}
 """Cells of a road user that is no player."""

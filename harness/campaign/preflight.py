@@ -257,9 +257,12 @@ def _games_at_once(document: Campaign | None, ego_driver: ExternalDriver) -> int
 
 
 def _ignored_tables(file: Path, document: Campaign, ego_driver: ExternalDriver | None) -> Iterator[Problem]:
-    """A problem for each table about round 2 of another kind of ego than the campaign's."""
+    """A problem for each table and key about another kind of ego than the campaign's."""
     if ego_driver is None and document.ego.driver not in (LEARNED, SUMO):
         return  # the ego's kind is not known
+    if document.ego.shield is not None and ego_driver is not None and ego_driver.vehicle_type is not None:
+        message = f"SUMO drives the ego {document.ego.driver!r}, so that there is no decision to check"
+        yield Problem(str(file), "ego.shield", message, "leave out this key, or name another ego.driver")
     learned = document.ego.driver == LEARNED
     reasons = {}
     if not _is_tunable(ego_driver):

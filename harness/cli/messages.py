@@ -59,12 +59,13 @@ def ego(campaign: OpenCampaign) -> str:
 
 def work(campaign: OpenCampaign, stages: Sequence[Stage]) -> str:
     """How many trainings and arms there are."""
-    from harness.campaign.plan.stages import AssessmentStage, TrainingStage
+    from harness.campaign.plan.stages import AssessmentStage, RejectionGate, TrainingStage
 
     document = campaign.document
     trainings = [stage for stage in stages if isinstance(stage, TrainingStage)]
     responses = sum(stage.is_best_response for stage in trainings)
-    arms = sum(isinstance(stage, AssessmentStage) for stage in stages)
+    of_arms = [stage for stage in stages if isinstance(stage, AssessmentStage)]
+    rejected = sum(any(isinstance(gate, RejectionGate) for gate in stage.gates) for stage in of_arms)
     if campaign.policies is None:
         parts = [f"{_counted(len(trainings) - responses, 'training')} of up to {document.training.steps:,} steps"]
     else:
@@ -72,7 +73,8 @@ def work(campaign: OpenCampaign, stages: Sequence[Stage]) -> str:
     if document.best_response is not None:
         budget = f"of up to {document.best_response.steps:,} steps"
         parts.append(f"{_counted(responses, 'training')} of best responses {budget}")
-    return ", ".join([*parts, f"{_counted(arms, 'arm')} of {_counted(document.assessment.episodes, 'episode')}:"])
+    arms = _counted(len(of_arms) - rejected, "arm") + (f" and up to {rejected} of rejected answers" if rejected else "")
+    return ", ".join([*parts, f"{arms} of {_counted(document.assessment.episodes, 'episode')}:"])
 
 
 def _counted(number: int, noun: str) -> str:

@@ -39,6 +39,9 @@ class Ego(Document):
     the name of an installed driver, of a shipped one, or of a shipped policy (`paper_merge/naive-seed11`)."""
     persona: DocumentPath = "careful"
     """The persona of the ego: its payoff and decisions. The ego is a machine and has none of the human limits."""
+    shield: Literal["rss"] | None = None
+    """A safety layer. Each arm of an ego up to round 2 is played a second time with it: the ego's decision is kept
+    unless responsibility-sensitive safety demands more braking. Nothing is trained with it. Left out: none."""
 
 
 class Population(Document):
@@ -60,7 +63,9 @@ class Crowd(Document):
 
 
 class Rounds(Document):
-    """Iterated best response: non-ego and ego are trained against each other in turn."""
+    """Iterated best response: non-ego and ego are trained against each other in turn. After each training from round 3
+    on, the player goes on with the best of its new policy and all its earlier ones, by as many games as an arm has,
+    none of which is a game of the assessment."""
 
     count: int = Field(2, ge=2, le=20)
     """Number of the last round. The non-ego learns in odd rounds, the ego in even rounds. The paper has 2 rounds."""
@@ -230,6 +235,9 @@ class Campaign(Document):
         if "preventable_failure_rate" in bounds and not self.assessment.reference_drivers:
             message = "with assessment.reference_drivers = false, it is not judged which failures are preventable"
             mistakes.append(("acceptance.preventable_failure_rate", message, "leave out one of these keys"))
+        if self.ego.driver == SUMO and self.ego.shield is not None:
+            message = "SUMO drives this ego, so that there is no decision to check"
+            mistakes.append(("ego.shield", message, "leave out this key, or name another ego.driver"))
         if self.ego.driver != LEARNED:
             if self.rounds.count > Rounds().count:
                 message = "the ego does not learn, so there are no further rounds"

@@ -25,11 +25,14 @@ from harness.evaluation.falsification_columns import FALSIFICATION, SEARCHES
 from harness.evaluation.measured_game import METRICS_OF_CONDUCT, METRICS_OF_GAMES, METRICS_OF_PLAYERS
 from harness.evaluation.over_trainings_columns import OVER_TRAININGS
 from harness.evaluation.preventability_columns import PREVENTABILITY, REFERENCE_DRIVERS
+from harness.evaluation.selection_columns import SELECTIONS
 from harness.evaluation.severity.closeness import CRITERIA
+from harness.evaluation.shield_columns import SHIELDS
 
 _T = "95 % t interval"
 _PAPER = "the paper, section 4.2"
 ARM = Column("arm", TEXT, "The name of the arm, such as naive_vs_speedy.")
+_SHIELDED_ARM = replace(ARM, name="shielded_arm", meaning="The same with the shield.")
 PERSONA = Column("persona", TEXT, "The persona of the non-ego; of an arm with one.")
 SEED = Column("seed", COUNT, "The training seed.")
 EPISODE = Column("episode", COUNT, "The game. Equal numbers begin alike in every arm and for every training seed.")
@@ -222,6 +225,8 @@ _TABLES = {
         Column("mean_duration_s", NUMBER, "Their mean duration."),
         Column("stopped", TEXT, "In the last row of a training: `converged`, `budget` or `did not learn`."),
     ),
+    "selections": (PERSONA, SEED, *SELECTIONS),
+    "shields": (ARM, _SHIELDED_ARM, PERSONA, SEED, *_PAIRS, *SHIELDS),
     "populations": (
         ARM,
         Column("population", TEXT, "The population that drove against the ego."),
@@ -253,9 +258,13 @@ _TABLES = {
         *_PAIRS,
         Column("payoff", NUMBER, "Mean payoff of the player of that role, over the pairs."),
         Column("payoff_best_response", NUMBER, "That of its best known response."),
-        Column("best_known", TEXT, "That response: `the search`, or another strategy or arm; two are joined by ` + `."),
-        Column("known", COUNT, "Other strategies of the player that were compared beside the search."),
-        Column("gap", NUMBER, "Mean of best known response minus player; below 0: nothing better is known."),
+        Column(
+            "best_known",
+            TEXT,
+            "That response: `its own strategy`, `the search`, or another strategy or arm; two are joined by ` + `.",
+        ),
+        Column("known", COUNT, "Other strategies of the player that were compared beside its own and the search."),
+        Column("gap", NUMBER, "Mean of best known response minus player; 0 or below: nothing better is known."),
         Column("ci_low", NUMBER, f"The low end of its {_T}.", label="its 95 % low"),
         Column("ci_high", NUMBER, f"The high end of its {_T}.", label="its 95 % high"),
         Column("gap_share", NUMBER, "gap / |payoff|; empty where the payoff is 0.", unit=SHARE),

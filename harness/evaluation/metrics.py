@@ -12,10 +12,10 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from harness.evaluation.column import NUMBER, TEXT, Column
+from harness.evaluation.column import NUMBER, SHARE, TEXT, Column
 from harness.evaluation.encounters import Encounter
 from harness.evaluation.recorded_game import RecordedGame
-from harness.game.arrays import FloatArray
+from harness.game.arrays import BoolArray, FloatArray
 from harness.game.outcome import Outcome
 
 
@@ -49,6 +49,12 @@ class Drive:
     def payoff(self) -> FloatArray:
         """Its payoff of each step."""
         return self.game.while_driving(self.game.payoff, self.player)
+
+    @property
+    def shielded(self) -> BoolArray | None:
+        """Whether a shield changed its decision; None without a shield."""
+        flags = self.game.shielded
+        return None if flags is None else self.game.while_driving(flags, self.player)
 
     @property
     def encounters(self) -> tuple[Encounter, ...]:
@@ -197,3 +203,28 @@ def accepted_gap_s(drive: Drive) -> float | None:
 )
 def payoff(drive: Drive) -> float:
     return float(drive.payoff.sum())
+
+
+@metric(
+    "ego",
+    meaning="Interventions of the shield per km driven: each a run of steps in which it changes the decision; empty "
+    "without a shield.",
+    mean="shield_interventions_per_km",
+    unit="1/km",
+)
+def shield_interventions_per_km(drive: Drive) -> float | None:
+    flags, driven_m = drive.shielded, float(drive.of("speed_mps").sum()) * drive.step_s
+    if flags is None or not driven_m:
+        return None
+    begins = np.diff(flags.astype(np.int64), prepend=0) > 0
+    return float(np.count_nonzero(begins)) / (driven_m / 1000.0)
+
+
+@metric(
+    "ego",
+    meaning="Share of the steps in which the shield changes the decision; empty without a shield.",
+    mean="shielded_share",
+    unit=SHARE,
+)
+def shielded_share(drive: Drive) -> float | None:
+    return float(drive.shielded.mean()) if drive.shielded is not None and len(drive.shielded) else None

@@ -19,6 +19,7 @@ from harness.evaluation.strategies import (
     NaiveEgo,
     PersonaNonEgo,
     RetrainedEgo,
+    ShieldedEgo,
     persona_alone,
     strategy_name,
 )
@@ -176,6 +177,7 @@ def _players(conduct: pd.DataFrame, arms: Mapping[str, Arm]) -> dict[_Player, pd
 def _roles(arms: Iterable[Arm]) -> Iterator[tuple[Arm, str, str]]:
     """Each arm with a player of it: its name in the table, and its persona."""
     own = [arm for arm in arms if arm.best_response_of is None and not arm.is_of_a_trait]
+    own = [arm for arm in own if not isinstance(arm.ego, ShieldedEgo)]  # the same people in the same games
     for arm in own:
         if isinstance(arm.ego, NaiveEgo | RetrainedEgo):
             yield arm, f"{strategy_name(arm.ego)} ego", ""

@@ -39,7 +39,7 @@ class RecordedGame:
     """A game from its trace, the constants of its scene, and the vehicle types (SUMO's default without an entry)."""
 
     trace: pd.DataFrame
-    """Columns of `trace_file.SCHEMA`."""
+    """Columns of `trace_file.SCHEMA` or `SHIELDED_SCHEMA`."""
     world: World
     kinds: Mapping[str, BodyKind]
 
@@ -109,6 +109,13 @@ class RecordedGame:
     def steers(self) -> BoolArray:
         """[P] whether the harness moved a player: the steering of SUMO's own models is not known."""
         return np.asarray(self._filled("steers")[:, : len(self.world.roles)].any(0))
+
+    @cached_property
+    def shielded(self) -> BoolArray | None:
+        """[T, P] whether a shield changed a player's decision; None: the arm has no shield."""
+        if "shielded" not in self.trace.columns:
+            return None
+        return self._filled("shielded")[:, : len(self.world.roles)]
 
     @cached_property
     def payoff(self) -> FloatArray:

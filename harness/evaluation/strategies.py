@@ -36,6 +36,13 @@ class RobustEgo:
 
 
 @dataclass(frozen=True, kw_only=True)
+class ShieldedEgo:
+    """An ego with the campaign's shield: its decisions are kept unless a rule forbids them."""
+
+    of: NaiveEgo | RetrainedEgo | ReconfiguredEgo | RobustEgo
+
+
+@dataclass(frozen=True, kw_only=True)
 class OtherEgo:
     """A driver that takes part in the cross-play beside the campaign's own egos."""
 
@@ -67,6 +74,16 @@ class PersonaNonEgo:
 
 
 @dataclass(frozen=True, kw_only=True)
+class RoundAnswer:
+    """What the training of a later round made of a player, before a selection took or rejected it."""
+
+    of: RetrainedEgo | PersonaNonEgo
+    """The player's strategy of that round: the answer where it was taken, else a policy that the player had before."""
+    is_rejected: bool = False
+    """Whether it plays in an arm: only a rejected answer does, under that name."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class BestResponse:
     """One training of a player's best response to the other player of an arm."""
 
@@ -75,8 +92,8 @@ class BestResponse:
     start: int
 
 
-EgoStrategy = NaiveEgo | RetrainedEgo | ReconfiguredEgo | RobustEgo | OtherEgo
-NonEgoStrategy = SumoNonEgo | PersonaNonEgo
+EgoStrategy = NaiveEgo | RetrainedEgo | ReconfiguredEgo | RobustEgo | ShieldedEgo | OtherEgo | RoundAnswer
+NonEgoStrategy = SumoNonEgo | PersonaNonEgo | RoundAnswer
 Strategy = EgoStrategy | NonEgoStrategy | BestResponse
 
 
@@ -125,7 +142,10 @@ def against_persona(ego: EgoStrategy, persona: str) -> Arm:
 
 
 def counterparts(arm: Arm) -> list[Arm]:
-    """The arms to compare an arm with: the ego of round 2 with the naive ego, against the persona of its training."""
+    """The arms to compare an arm with: the ego of round 2 with the naive ego, against the persona of its training; a
+    shielded ego with the same one without its shield."""
+    if isinstance(arm.ego, ShieldedEgo):
+        return [replace(arm, ego=arm.ego.of)]
     if not isinstance(arm.non_ego, PersonaNonEgo):
         return []
     persona = arm.non_ego.persona
@@ -147,12 +167,16 @@ def strategy_name(strategy: Strategy) -> str:
             return f"reconfigured_{against}"
         case RobustEgo():
             return "robust"
+        case ShieldedEgo(of=of):
+            return f"shielded_{strategy_name(of)}"
         case OtherEgo(driver=driver):
             return driver
         case SumoNonEgo():
             return "sumo"
         case PersonaNonEgo(persona=persona, round=round_, borrowed=borrowed):
             return persona + (f"_round{round_}" if round_ > 1 else "") + _borrowed_name(borrowed)
+        case RoundAnswer(of=of, is_rejected=is_rejected):
+            return f"{strategy_name(of)}_{'rejected' if is_rejected else 'answer'}"
         case BestResponse(arm=arm, start=start):
             return f"{arm.name}{start}"
 
@@ -169,6 +193,8 @@ def player_of(strategy: Strategy) -> int:
         case BestResponse(arm=arm):
             assert arm.best_response_of is not None
             return arm.best_response_of
+        case RoundAnswer(of=of):
+            return player_of(of)
         case SumoNonEgo() | PersonaNonEgo():
             return NON_EGO
         case _:
@@ -182,11 +208,15 @@ def round_of(strategy: Strategy) -> int:
             return round_
         case ReconfiguredEgo():
             return PAPER_ROUNDS
+        case RoundAnswer(of=of) | ShieldedEgo(of=of):
+            return round_of(of)
         case _:
             return 0
 
 
 def _pair_name(ego: EgoStrategy | None, non_ego: NonEgoStrategy | None) -> str:
+    if isinstance(ego, ShieldedEgo):
+        return f"shielded_{_pair_name(ego.of, non_ego)}"
     if ego is None:
         assert non_ego is not None, "an arm has at least one player"
         return f"{strategy_name(non_ego)}_alone"

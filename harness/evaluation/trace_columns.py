@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from harness.evaluation.column import COUNT, FLAG, NUMBER, TEXT, Column
 
+SHIELDED = Column("shielded", FLAG, "Whether a shield changed the player's decision; in arms with a shield only.")
 _LINKS = "by traffic light and signal link"
 TRACE_COLUMNS = (
     Column("episode", COUNT, "The game."),

@@ -24,7 +24,7 @@ import pyarrow.parquet as pq
 
 from harness.errors import UsageError
 from harness.evaluation.column import COUNT, FLAG, NUMBER, TEXT
-from harness.evaluation.trace_columns import TRACE_COLUMNS
+from harness.evaluation.trace_columns import SHIELDED, TRACE_COLUMNS
 from harness.files import check_file, errors_naming, replace_durably, scratch_beside
 from harness.game.arrays import FloatArray
 
@@ -36,24 +36,26 @@ _LARGEST, _MOST_STEPS = 1e8, 1_000_000
 _TEXT = pa.dictionary(pa.int32(), pa.string())
 _TYPES = {COUNT: pa.int32(), NUMBER: pa.float64(), FLAG: pa.bool_(), TEXT: _TEXT}
 SCHEMA = pa.schema([(column.name, _TYPES[column.dtype]) for column in TRACE_COLUMNS])
+SHIELDED_SCHEMA = SCHEMA.append(pa.field(SHIELDED.name, _TYPES[SHIELDED.dtype]))
+"""Of the traces of an arm with a shield."""
 
 _TEXTS = [field.name for field in SCHEMA if field.type == _TEXT]
 _NUMBERS = [field.name for field in SCHEMA if field.type == pa.float64()]
 
 
 @contextmanager
-def trace_writer(path: Path) -> Iterator[Callable[[Mapping[str, Sequence[Any]]], None]]:
+def trace_writer(path: Path, schema: pa.Schema = SCHEMA) -> Iterator[Callable[[Mapping[str, Sequence[Any]]], None]]:
     """Writes the games of a segment: a function that adds one, as columns of its trace. The file appears only when all
-    games are in it."""
-    games: list[pa.Table] = [SCHEMA.empty_table()]
+    games are in it. `schema`: `SCHEMA` or `SHIELDED_SCHEMA`."""
+    games: list[pa.Table] = [schema.empty_table()]
 
     def add(columns: Mapping[str, Sequence[Any]]) -> None:
         games.append(
-            pa.table({name: pa.array(columns[name], SCHEMA.field(name).type) for name in SCHEMA.names}, SCHEMA)
+            pa.table({name: pa.array(columns[name], schema.field(name).type) for name in schema.names}, schema)
         )
 
     yield add
-    _write([pa.concat_tables(games).unify_dictionaries().combine_chunks()], path)
+    _write([pa.concat_tables(games).unify_dictionaries().combine_chunks()], path, schema)
 
 
 def join_traces(parts: Sequence[Path], path: Path, labels: Mapping[str, str | int] = MappingProxyType({})) -> None:
@@ -64,7 +66,8 @@ def join_traces(parts: Sequence[Path], path: Path, labels: Mapping[str, str | in
     metadata: dict[bytes | str, bytes | str] = {name: str(label) for name, label in labels.items()}
     if labels:
         metadata["PANDAS_ATTRS"] = json.dumps(dict(labels))
-    _write((group for part in parts for group in _row_groups(part)), path, SCHEMA.with_metadata(metadata or None))
+    schema = SHIELDED_SCHEMA if SHIELDED.name in pq.read_schema(parts[0]).names else SCHEMA
+    _write((group for part in parts for group in _row_groups(part)), path, schema.with_metadata(metadata or None))
 
 
 def read_traces(path: Path) -> Iterator[tuple[int, pd.DataFrame]]:
@@ -104,7 +107,7 @@ class TraceReader:
                 self._segments[path] = _segments_of(path)
             segments = self._segments[path]
             tables = [self._table(segment) for low, high, segment in segments if low <= episode <= high]
-            rows = pa.concat_tables([SCHEMA.empty_table(), *tables])
+            rows = pa.concat_tables(tables or [SCHEMA.empty_table()])
             rows = rows.filter(pyarrow.compute.equal(rows["episode"], episode))
             frame = rows.unify_dictionaries().to_pandas()
             _check_game(frame)
@@ -176,7 +179,7 @@ def check_traces(path: Path, episodes: Iterable[int]) -> None:
 
 
 def _check_schema(schema: pa.Schema) -> None:
-    if not schema.equals(SCHEMA):
+    if not schema.equals(SCHEMA) and not schema.equals(SHIELDED_SCHEMA):
         different = sorted(set(schema.names) ^ set(SCHEMA.names)) or ["types"]
         raise ValueError(f"its columns are not those of a trace: {', '.join(different)[:200]}")
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from harness.config.traits import TRAITS
 from harness.evaluation.strategies import (
     ATTENTIVE,
@@ -13,6 +15,8 @@ from harness.evaluation.strategies import (
     PersonaNonEgo,
     ReconfiguredEgo,
     RetrainedEgo,
+    RoundAnswer,
+    ShieldedEgo,
     SumoNonEgo,
     strategy_name,
 )
@@ -31,6 +35,8 @@ def _in_words(arm: Arm, tables: RunTables) -> str:
         player = ("the ego", "the non-ego")[arm.best_response_of]
         return f"{arm.pair.name}, {player} replaced by its best response"
     match arm:
+        case Arm(ego=ShieldedEgo(of=of)):
+            return f"{_in_words(replace(arm, ego=of), tables)}; the ego has a shield"
         case Arm(ego=None, non_ego=non_ego) if non_ego is not None:
             return f"{_non_ego_in_words(non_ego)} without the ego"
         case Arm(ego=NaiveEgo(), non_ego=None):
@@ -56,6 +62,8 @@ def _non_ego_in_words(non_ego: NonEgoStrategy) -> str:
             return f"the non-ego {persona} with its eyes on the road"
         case PersonaNonEgo(persona=persona, borrowed=Borrowed(trait=trait, of=of)):
             return f"the non-ego {persona} with the {TRAITS[trait].words} of {of}"
+        case RoundAnswer(of=of):
+            return f"the rejected answer of the non-ego {strategy_name(of)}"
         case _:
             return f"the non-ego {strategy_name(non_ego)}"
 
@@ -68,5 +76,7 @@ def _ego_in_words(ego: EgoStrategy, naive: str) -> str:
             return f"the ego tuned against {against}"
         case RetrainedEgo(against=against, round=2):
             return f"the ego retrained against {against}"
+        case RoundAnswer(of=of):
+            return f"the rejected answer of the ego {strategy_name(of)}"
         case _:
             return f"the ego {strategy_name(ego)}"

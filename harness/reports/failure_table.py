@@ -17,6 +17,7 @@ from harness.evaluation.strategies import (
     ReconfiguredEgo,
     RetrainedEgo,
     RobustEgo,
+    ShieldedEgo,
     SumoNonEgo,
     against_persona,
 )
@@ -93,7 +94,15 @@ def egos_in(tables: RunTables) -> dict[str, list[EgoStrategy]]:
         egos[f"{tables.change.made} ego"] = list(dict.fromkeys(changed))
     if any(arm.ego == RobustEgo() for arm in tables.arms.values()):
         egos["robust ego"] = [RobustEgo()]
+    with_shield = {arm.ego for arm in tables.arms.values() if isinstance(arm.ego, ShieldedEgo)}
+    for words, column in list(egos.items()):
+        shielded: list[EgoStrategy] = [each for each in map(_shielded, column) if each in with_shield]
+        egos |= {f"{words} with the shield": shielded} if shielded else {}
     return egos
+
+
+def _shielded(ego: EgoStrategy) -> EgoStrategy:
+    return ShieldedEgo(of=ego) if isinstance(ego, NaiveEgo | RetrainedEgo | ReconfiguredEgo | RobustEgo) else ego
 
 
 def _lines(tables: RunTables, links: GameLinks) -> Iterator[PersonLine]:
@@ -109,7 +118,8 @@ def _lines(tables: RunTables, links: GameLinks) -> Iterator[PersonLine]:
     if (baseline := tables.manifest.get("baseline")) and baseline not in tables.personas:
         yield PersonLine(person=baseline, cells=cells(PersonaNonEgo(persona=baseline)) + last, is_baseline=True)
     for persona in tables.personas:
-        own = [[tables.last_ego(persona)] if len(column) > 1 else column for column in egos]
+        answers = tables.last_ego(persona), _shielded(tables.last_ego(persona))
+        own = [[each for each in column if len(column) == 1 or each in answers] for column in egos]
         met = [_cell([against_persona(ego, persona).name for ego in column], tables, links) for column in own]
         yield PersonLine(person=persona, cells=[*met, judged[persona]] if last else met)
     known = [[name for name, arm in tables.arms.items() if arm.ego in column and _is_answer(arm)] for column in egos]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from harness.evaluation.game_theory.best_response_gap import SEARCH
+from harness.evaluation.game_theory.best_response_gap import OWN, SEARCH
 from harness.evaluation.gap_verdict import GapVerdict
 from harness.reports.numbers import MINUS, NO_SPACE, SURE, interval, number, p_text, percent, signed, sure
 from harness.reports.run_tables import Row
@@ -25,6 +25,8 @@ def induced_failures(row: Row) -> str:
     games, rate = row["pairs"], row["ego_failure_rate_best_response"]
     if not games:
         return f"The effect of a {row['persona']} driver newly trained against this ego was not measured."
+    if row["best_known"] == OWN:
+        return f"Nothing is known by which a {row['persona']} driver earns more against this ego than it does."
     span = sure(row["ego_failure_rate_best_response_low"], row["ego_failure_rate_best_response_high"])
     counts = f"{round(rate * games)} of {games} games ({percent(rate)}; {span})"
     text = f"{_responding(str(row['persona']), row)} {counts} instead of {round(row['ego_failure_rate'] * games)}"
@@ -83,14 +85,14 @@ def _budget(row: Row) -> str:
 
 
 def _known(row: Row) -> list[str]:
-    """The known strategies that were taken as best response, beside the search or in its place."""
-    return [name for name in row["best_known"].split(" + ") if name not in ("", SEARCH)]
+    """The other strategies that were taken as best response, beside the search or in its place."""
+    return [name for name in row["best_known"].split(" + ") if name not in ("", OWN, SEARCH)]
 
 
 def _by_playing(row: Row) -> str:
     """The known strategies by which the gain was measured; empty where the search alone found it."""
     names = _known(row)
-    if names and row["best_known"].startswith(SEARCH):
+    if names and SEARCH in row["best_known"].split(" + "):
         names = ["the newly trained strategy", *names]
     return f" by playing {' or '.join(names)}" if names else ""
 

@@ -19,7 +19,7 @@ from harness.reports.embedding import GameTracks, embedded_games, recorded_docum
 from harness.reports.failing_paths import FailingPath
 from harness.reports.failure_table import failure_table
 from harness.reports.first_answers import first_answers
-from harness.reports.game import game_section
+from harness.reports.game import game_section, selection_sentences
 from harness.reports.game_links import GameLinks
 from harness.reports.learning import learning, searches, stopped
 from harness.reports.manoeuvres import causes_by_game, failures_by_cause, marks_of
@@ -40,6 +40,8 @@ CAPTIONS = {
     "training": "A row per window of a learning curve.",
     "episodes": "A row per game.",
     "reconfiguration": "A row per trial and parameter of a search.",
+    "shields": "A row per arm and training seed: the ego without its shield, and with it, in the same games.",
+    "selections": "A row per candidate of each selection; the last one is the new answer.",
 }
 """Of the tables that are shown as the CSV files have them."""
 REPLAYS_SHOWN = 12
@@ -98,6 +100,7 @@ def render_page(
         glossary=glossary(tables),
         versions=tables.manifest.get("versions", {}),
         game=game_section(tables.game, links),
+        selections=selection_sentences(tables.selections),
         human_rows=human_ranges.human_rows(tables.realism),
         human_headline=human_ranges.headline(tables.realism),
         human_plots=human_ranges.plots(tables.realism),

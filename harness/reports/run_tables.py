@@ -74,6 +74,10 @@ class RunTables:
     training: pd.DataFrame = field(default_factory=_empty("training"))
     reconfiguration: pd.DataFrame = field(default_factory=_empty("reconfiguration"))
     """Empty: the report has no section on searches."""
+    selections: pd.DataFrame = field(default_factory=_empty("selections"))
+    """Empty: the campaign has no rounds after the paper's."""
+    shields: pd.DataFrame = field(default_factory=_empty("shields"))
+    """Empty: the ego has no shield."""
     populations: pd.DataFrame = field(default_factory=_empty("populations"))
     causes: pd.DataFrame = field(default_factory=_empty("causes"))
     realism: pd.DataFrame = field(default_factory=_empty("realism"))

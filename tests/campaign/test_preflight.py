@@ -116,6 +116,15 @@ def test_open_campaign__the_folder_of_a_policy(tmp_path: Path) -> None:
     assert Path(problem.file).name == "policy.safetensors"
 
 
+def test_open_campaign__a_shield_needs_an_ego_that_decides(tmp_path: Path) -> None:
+    (tmp_path / "krauss.toml").write_text('kind = "sumo"\nvehicle_type = "ego_car"\n', encoding="utf-8")
+    ego = {"driver": "krauss.toml", "persona": str(CAREFUL), "shield": "rss"}
+    (problem,) = problems_of(write_campaign(tmp_path, ego=ego))
+    assert (problem.key, Path(problem.file).name) == ("ego.shield", "tiny.toml")
+    assert "SUMO drives the ego 'krauss.toml'" in problem.message
+    assert "another ego.driver" in problem.remedy
+
+
 def test_open_campaign__tells_of_egos_that_learned_in_other_games(tmp_path: Path) -> None:
     card = {"player": "ego", "persona": "hasty", "persona_sha256": "0" * 64, "scene": "merge"}
     for name, scene in (("mine", "paper_merge"), ("other", "crossing")):

@@ -15,7 +15,8 @@ import pandas as pd
 import pytest
 
 from harness.campaign.plan.paper_rounds import questions
-from harness.campaign.plan.stages import AssessmentStage, Reconfigured, SearchStage, TrainingStage
+from harness.campaign.plan.planned_drivers import Reconfigured
+from harness.campaign.plan.stages import AssessmentStage, SearchStage, TrainingStage
 from harness.campaign.preflight import open_campaign
 from harness.config.driver import read_driver
 from harness.evaluation.tables import read_csv

@@ -16,7 +16,7 @@ from harness.game.outcome import Outcome
 INF = np.inf
 
 
-def drive(outcome: Outcome = Outcome.GOAL, steers: bool = True, **changes: Any) -> Any:
+def drive(outcome: Outcome = Outcome.GOAL, steers: bool = True, shielded: Any = None, **changes: Any) -> Any:
     """Four steps of 0.5 s, without encounters at junctions."""
     of = {
         "speed_mps": [10.0, 12.0, 11.0, 3.0],
@@ -30,6 +30,7 @@ def drive(outcome: Outcome = Outcome.GOAL, steers: bool = True, **changes: Any) 
     }
     series = {name: np.array(values) for name, values in {**of, **changes}.items()}
     shared = {"acceleration_mps2": series["acceleration_mps2"], "payoff": series["payoff"], "encounters": ()}
+    shared["shielded"] = None if shielded is None else np.array(shielded)
     return SimpleNamespace(
         outcome=outcome, step_s=0.5, game=SimpleNamespace(steers=[steers]), player=0, of=series.__getitem__, **shared
     )
@@ -50,6 +51,8 @@ def test_metrics__by_hand() -> None:
         "pet_priority": None,
         "accepted_gap_s": None,
         "payoff": 4.75,
+        "shield_interventions_per_km": None,  # without a shield
+        "shielded_share": None,
     }
 
 
@@ -71,6 +74,9 @@ def test_registry__says_what_each_column_is() -> None:
     [
         ("latest_red_s", {"passed_red_s": [-1.0] * 4}, None),
         ("red_lights", {"passed_red_s": [-1.0] * 4}, 0.0),
+        ("shield_interventions_per_km", {"shielded": [True, False, True, True]}, 2 / 0.018),  # 36 m/s in steps of 0.5 s
+        ("shield_interventions_per_km", {"shielded": [False] * 4}, 0.0),
+        ("shielded_share", {"shielded": [True, False, True, True]}, 0.75),
         ("time_to_goal_s", {"outcome": Outcome.COLLISION}, None),
         ("time_to_goal_s", {"outcome": Outcome.TIMEOUT}, None),
         ("trailing_distance_m", {"leader_gap_m": [INF] * 4}, None),

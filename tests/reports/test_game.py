@@ -12,7 +12,7 @@ import pytest
 from harness.evaluation.column import POINTS, SHARE
 from harness.evaluation.game_theory.empirical_game import equilibria
 from harness.evaluation.tables import columns_of, table_of, write_csv
-from harness.reports.game import CAPTIONS, equilibrium_sentences, game_section
+from harness.reports.game import CAPTIONS, equilibrium_sentences, game_section, selection_sentences
 from harness.reports.game_links import GameLinks
 from harness.reports.heatmaps import OPENS_A_GAME, views
 from tests.support.chromium import COLOURS, contrast, rgb, unfold
@@ -191,3 +191,37 @@ def test_browser__a_seed_is_chosen_by_keyboard_or_mouse(opened):
     assert shown.inner_text() == "Failure rate of the ego (%), seed 2"
     page.keyboard.press("ArrowLeft")
     assert shown.inner_text() == "Failure rate of the ego (%), seed 1"
+
+
+# --- selections ---
+
+
+def candidate(name: str, payoff: float, role: str = "ego", round_: int = 4, chosen: bool = False) -> dict[str, object]:
+    strategy = f"retrained_anna_round{round_}" if role == "ego" else f"anna_round{round_}"
+    cells = {"candidate": name, "payoff": payoff, "role": role, "round": round_, "chosen": chosen, "strategy": strategy}
+    return {"persona": "anna", "seed": 1, "episodes": 100, "alone": 25, "left_out": 0, **cells}
+
+
+def test_selection__is_told_with_what_the_answer_and_the_best_other_policy_earned() -> None:
+    table = table_of(
+        "selections",
+        [
+            candidate("anna", 3.0, "non_ego", 3),
+            candidate("anna_round3_answer", 4.5, "non_ego", 3, chosen=True),
+            candidate("naive", 1.0),
+            candidate("retrained_anna", 7.25, chosen=True),
+            candidate("retrained_anna_round4_answer", 6.0),
+        ],
+    )
+    assert selection_sentences(table) == [
+        (
+            1,
+            "Round 3, the anna driver: the new answer is taken. In 100 games, 25 of them alone, it earned 4.50 on "
+            "average, the best policy before it, anna, 3.00.",
+        ),
+        (
+            1,
+            "Round 4, the ego against anna: the new answer is rejected. In 100 games, 25 of them alone, it earned 6.00 "
+            "on average, retrained_anna 7.25: the player goes on with this policy.",
+        ),
+    ]

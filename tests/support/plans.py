@@ -8,7 +8,8 @@ from typing import Any
 from harness.campaign.execution.cache_keys import stage_keys
 from harness.campaign.execution.stage_run import RunContext
 from harness.campaign.plan.plan import plan
-from harness.campaign.plan.stages import Stage, Trained, TrainingStage
+from harness.campaign.plan.planned_drivers import Trained
+from harness.campaign.plan.stages import Stage, TrainingStage
 from harness.campaign.preflight import open_campaign
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign

@@ -69,7 +69,7 @@ class Segment:
     ) -> None:
         """Play it; `games` yields its games next. `on_game` gets the number of those that are played."""
         records = []
-        with trace_writer(self.file(_TRACES)) as add_trace:
+        with trace_writer(self.file(_TRACES), arm.trace_schema) as add_trace:
             for _ in self.episodes:
                 game = next(games)
                 records.append({**game.played, **labels})

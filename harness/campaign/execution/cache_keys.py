@@ -10,17 +10,15 @@ from collections.abc import Sequence
 from typing import Any
 
 from harness.assessment.continuation import Continuation
+from harness.campaign.plan.planned_drivers import BestOf, External, Shielded, borrowed_of, members_of, persona_of
 from harness.campaign.plan.stages import (
     AssessmentStage,
-    BestOf,
-    External,
+    EquilibriumGate,
     PreventabilityStage,
     SearchStage,
+    SelectionStage,
     Stage,
     TrainingStage,
-    borrowed_of,
-    members_of,
-    persona_of,
 )
 from harness.campaign.plan.strategy_stages import training_settings
 from harness.campaign.preflight import OpenCampaign
@@ -65,7 +63,7 @@ def _inputs(campaign: OpenCampaign, stage: Stage) -> dict[str, Any]:
             inputs["continuations"] = [each.value for each in Continuation]
         case _:
             inputs["episodes"] = document.assessment.episodes
-    if isinstance(stage, AssessmentStage | PreventabilityStage) and stage.seed != document.start_seed:
+    if isinstance(stage, AssessmentStage | SelectionStage | PreventabilityStage) and stage.seed != document.start_seed:
         inputs["start_seed"] = document.start_seed  # that of the first training seed is in the stage
     if campaign.policies is not None and stage.reads:
         others = campaign.policy_drivers
@@ -75,9 +73,11 @@ def _inputs(campaign: OpenCampaign, stage: Stage) -> dict[str, Any]:
     named = {each.name for each in members_of(*stage.drivers) if isinstance(each, External)}
     if crossplay := sorted(named - {""}):
         inputs["others"] = {name: campaign.other_egos[name].identity for name in crossplay}
+    if any(isinstance(each, Shielded) for each in stage.drivers):
+        inputs["shield"] = reference_identity()["rss"]
     if any(isinstance(each, BestOf) for each in stage.drivers):
         inputs["choice_episodes"] = document.assessment.episodes
-    if stage.gates:
+    if any(isinstance(gate, EquilibriumGate) for gate in stage.gates):
         inputs["significance"] = document.assessment.significance
         inputs["competence"] = document.competence.record()
     return inputs

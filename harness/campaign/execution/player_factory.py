@@ -10,8 +10,7 @@ import numpy as np
 
 from harness.assessment.rollout import SeatedArm, assess
 from harness.campaign.execution.stage_run import RunContext
-from harness.campaign.plan.stages import (
-    AssessmentStage,
+from harness.campaign.plan.planned_drivers import (
     BestOf,
     EquilibriumMixture,
     External,
@@ -19,6 +18,7 @@ from harness.campaign.plan.stages import (
     PlannedDriver,
     PlannedMember,
     Reconfigured,
+    Shielded,
     Side,
     SumoDriven,
     Trained,
@@ -28,6 +28,7 @@ from harness.campaign.plan.stages import (
     driver_in,
     persona_of,
 )
+from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.storage.arm_tables import arm_tables
 from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.trained_policies import DRIVER
@@ -36,9 +37,10 @@ from harness.config.persona import Persona
 from harness.config.traits import with_trait_of
 from harness.config.tunable import Adjustable
 from harness.drivers.car import car_of
-from harness.drivers.mixture import Member, Mixture
+from harness.drivers.mixture import Member, Mixture, mixture_of
 from harness.drivers.policy_file import LearnedDriver, read_policy
 from harness.drivers.protocol import Driver
+from harness.drivers.shield import ShieldedDriver
 from harness.drivers.sumo import SumoDriver
 from harness.errors import StageFailed
 from harness.evaluation.game_theory.nash import NoEquilibrium, equilibrium_shares
@@ -58,8 +60,12 @@ class PlayerFactory:
 
     def arm(self, stage: AssessmentStage) -> SeatedArm:
         """The arm of an assessment. A `BestOf` in it has to be `chosen` first."""
-        drivers = (self.player(driver_in(stage.ego, 0)), *self.people(stage.non_ego))
-        return SeatedArm(name=stage.name, scene=self.scene, drivers=drivers, seed=self.context.document.start_seed)
+        return self.seated(stage.name, stage.ego, stage.non_ego)
+
+    def seated(self, name: str, ego: Side, non_ego: Side) -> SeatedArm:
+        """The two sides of an arm, with drivers that are made anew."""
+        drivers = (self.player(driver_in(ego, 0)), *self.people(non_ego))
+        return SeatedArm(name=name, scene=self.scene, drivers=drivers, seed=self.context.document.start_seed)
 
     def people(self, side: Side) -> tuple[Mixture | None, ...]:
         """The drivers in each place of the non-egos, each made anew."""
@@ -74,6 +80,8 @@ class PlayerFactory:
                 return self._mixture(members, shares)
             case EquilibriumMixture(members=members):
                 return self._mixture(members, equilibrium_of(planned, self.context.folder))
+            case Shielded(members=(member,)):
+                return mixture_of(ShieldedDriver(self.driver(member), self.scene.world), self.persona(member))
             case BestOf():
                 raise TypeError("choose the best with `chosen` first")
             case _:
@@ -94,8 +102,8 @@ class PlayerFactory:
             sides = [*stage.sides]
             sides[learner] = (member,)
             candidates.append(replace(stage, ego=sides[0], non_ego=sides[1]))
-            played = (game.recorded for game in assess(self.arm(candidates[-1]), games))
-            measured = [float(game.payoff[:, learner].sum()) for game in played if game is not None]
+            payoffs = (game.payoff_of(learner) for game in assess(self.arm(candidates[-1]), games))
+            measured = [payoff for payoff in payoffs if np.isfinite(payoff)]
             if not measured:
                 raise StageFailed(f"{stage.id}: none of the games that choose the best response could be played")
             earned.append(float(np.mean(measured)))

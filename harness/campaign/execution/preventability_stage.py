@@ -19,7 +19,8 @@ from harness.assessment.continuation import Continuation
 from harness.assessment.rollout import assess
 from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import StageRun
-from harness.campaign.plan.stages import PreventabilityStage, SumoDriven
+from harness.campaign.plan.planned_drivers import SumoDriven
+from harness.campaign.plan.stages import PreventabilityStage
 from harness.campaign.storage.arm_tables import arm_tables
 from harness.campaign.storage.checksums import intact_record, write_checksums
 from harness.campaign.storage.run_folder import JUDGED

@@ -136,5 +136,6 @@ def _done_line(event: Event) -> str:
         return f"skipped  {event.stage}: {info['message']}"
     amount = f"{info['steps']:,} steps, {info['stopped']}" if "steps" in info else ""
     amount = amount or next(f"{info[unit]} {unit}" for unit in ("episodes", "trials") if unit in info)
+    amount += f", chosen: {info['chosen']}" if "chosen" in info else ""
     errors = f", {info['errors']} errors" if info.get("errors") else ""
     return f"done     {event.stage}: {amount}{errors} in {info['seconds']:.0f} s"

@@ -169,5 +169,5 @@ class _ManifestKeeper:
 
 
 def _status(info: Mapping[str, Any]) -> str:
-    """The status of a finished stage: `settled` where an approximate equilibrium left nothing to do."""
+    """The status of a finished stage: `settled` where a gate left nothing to do."""
     return "settled" if info.get("settled") else "done"

@@ -9,18 +9,19 @@ from pathlib import Path, PurePosixPath
 from harness.assessment.rollout import SeatedArm
 from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import RunContext
-from harness.campaign.plan.stages import (
-    AssessmentStage,
+from harness.campaign.plan.planned_drivers import (
     BestOf,
     EquilibriumMixture,
     External,
     FixedMixture,
     PlannedMember,
     Reconfigured,
+    Shielded,
     Trained,
     TrainedBefore,
     driver_in,
 )
+from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.storage.manifest import planned
 from harness.campaign.storage.run_folder import MANIFEST, RunFolder
 from harness.config.campaign import Campaign
@@ -77,9 +78,10 @@ class RunPlayers:
 
     def arms(self) -> list[AssessmentStage]:
         """The arms in which an ego meets people, with a driver each that this run can make again: none that other arms
-        chose or weighed."""
+        chose or weighed, nor a shielded one."""
         arms = [each for each in self._stages if isinstance(each, AssessmentStage) and each.ego and each.non_ego]
-        return [arm for arm in arms if not any(isinstance(each, BestOf | EquilibriumMixture) for each in arm.drivers)]
+        left_out = BestOf | EquilibriumMixture | Shielded
+        return [arm for arm in arms if not any(isinstance(each, left_out) for each in arm.drivers)]
 
     def arm(self, name: str, seed: int) -> AssessmentStage:
         """An arm by name. Raises UsageError if there is none, or if its drivers were chosen by other arms."""
@@ -130,7 +132,7 @@ class RunPlayers:
         if isinstance(planned, FixedMixture):
             return planned.members[member_in_episode(planned.shares, player, self.start_seed, episode)]
         assert planned is not None
-        assert not isinstance(planned, BestOf | EquilibriumMixture), "left out of `arms`"
+        assert not isinstance(planned, BestOf | EquilibriumMixture | Shielded), "left out of `arms`"
         return planned
 
 

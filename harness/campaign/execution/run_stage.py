@@ -3,7 +3,8 @@
 A stage is a function of its inputs alone, which `cache_keys` hashes: a stage that is done is skipped. Where an
 approximate equilibrium is reached, later stages have nothing to do: no player's best response gains anything
 distinguishable from 0. A pair of which a player can't drive the scene alone is in none, nor is one of which a search
-lacks power: that no training found anything better shows nothing.
+lacks power: that no training found anything better shows nothing. Stages about rejected answers have nothing to do
+where the selection took the answer.
 """
 
 from __future__ import annotations
@@ -18,8 +19,11 @@ from harness.campaign.execution.stage_run import Help, StageRun, Task
 from harness.campaign.plan.stages import (
     AssessmentStage,
     EquilibriumGate,
+    Gate,
     PreventabilityStage,
+    RejectionGate,
     SearchStage,
+    SelectionStage,
     Stage,
     TrainingStage,
 )
@@ -45,12 +49,11 @@ def _carry_out_stage(stage: Stage, run: StageRun) -> dict[str, Any]:
     context, key, started_s = run.context, run.context.keys[stage.id], time.monotonic()
     folder = context.folder
     folder.begin(stage.id, key)
-    gate = equilibrium_before(stage, folder, context.document)
-    if gate is not None:
-        message = f"not needed: {gate.pair} is an approximate equilibrium"
-        settled: dict[str, Any] = {"settled": gate.pair, "message": message}
-        folder.finish(stage.id, key, settled)
-        return settled
+    match closed_gate_before(stage, folder, context.document):
+        case EquilibriumGate(pair=pair):
+            return _leave(stage, folder, key, pair, f"{pair} is an approximate equilibrium")
+        case RejectionGate(answer=answer):
+            return _leave(stage, folder, key, answer, f"{answer} was taken, and no answer was rejected")
     scene = open_scene(folder.scene, context.vehicle_type(stage))
     facts, files = _make(stage, run, scene)
     facts["seconds"] = round(time.monotonic() - started_s, 1)
@@ -58,6 +61,13 @@ def _carry_out_stage(stage: Stage, run: StageRun) -> dict[str, Any]:
     folder.finish(stage.id, key, facts, files)
     if not facts.get("errors"):  # the segments of failed games are kept: the next run of the command plays those again
         shutil.rmtree(folder.segments(stage.id), ignore_errors=True)
+    return facts
+
+
+def _leave(stage: Stage, folder: RunFolder, key: str, settled: str, reason: str) -> dict[str, Any]:
+    """Mark a stage as finished, with nothing to do."""
+    facts = {"settled": settled, "message": f"not needed: {reason}"}
+    folder.finish(stage.id, key, facts)
     return facts
 
 
@@ -80,45 +90,60 @@ def _make(stage: Stage, run: StageRun, scene: OpenScene) -> tuple[dict[str, Any]
             from harness.campaign.execution.search_stage import carry_out_search
 
             return carry_out_search(stage, run, scene)
+        case SelectionStage():
+            from harness.campaign.execution.selection_stage import carry_out_selection
+
+            return carry_out_selection(stage, run, scene)
         case PreventabilityStage():
             from harness.campaign.execution.preventability_stage import carry_out_preventability
 
             return carry_out_preventability(stage, run, scene)
 
 
-def equilibrium_before(stage: Stage, folder: RunFolder, campaign: Campaign) -> EquilibriumGate | None:
-    """The first gate of a stage whose pair is an approximate equilibrium; None if the stage has to be carried out.
+def closed_gate_before(stage: Stage, folder: RunFolder, campaign: Campaign) -> Gate | None:
+    """The first gate of a stage that leaves it nothing to do; None if the stage has to be carried out."""
+    return next((gate for gate in stage.gates if _is_closed(gate, stage, folder, campaign)), None)
+
+
+def _is_closed(gate: Gate, stage: Stage, folder: RunFolder, campaign: Campaign) -> bool:
+    match gate:
+        case RejectionGate(selection=selection, answer=answer):
+            record = folder.done(selection)
+            return record is not None and record["info"].get("chosen") == answer
+        case EquilibriumGate():
+            return _is_equilibrium(gate, stage, folder, campaign)
+
+
+def _is_equilibrium(gate: EquilibriumGate, stage: Stage, folder: RunFolder, campaign: Campaign) -> bool:
+    """Whether a gate's pair is an approximate equilibrium.
 
     The searched best responses alone decide. The campaign's other strategies, which count in `gaps.csv`, may be made
     later than this stage: by them the result would depend on the order of the stages.
     """
     search = campaign.best_response
-    for gate in stage.gates:
-        assert search is not None, "only a campaign with best responses has gates"
-        import pandas as pd  # slow to import, and few stages have gates
+    assert search is not None, "only a campaign with best responses has gates"
+    import pandas as pd  # slow to import, and few stages have gates
 
-        from harness.campaign.storage.arm_tables import arm_tables
-        from harness.evaluation.game_theory.best_response_gap import Response, Role, gaps, nothing_to_gain
+    from harness.campaign.storage.arm_tables import arm_tables
+    from harness.evaluation.game_theory.best_response_gap import Response, Role, gaps, nothing_to_gain
 
-        episodes = pd.concat([arm_tables(folder, each).episodes for each in gate.stages], ignore_index=True)
-        pair, *responses = (str(name) for name in episodes["arm"].unique()[:3])
-        roles: tuple[Role, Role] = ("ego", "non_ego")
-        asked = [
-            Response(
-                seed=stage.seed,
-                role=role,
-                persona=stage.persona,
-                round=0,
-                pair_arm=pair,
-                response_arm=arm,
-                ego="",
-                non_ego="",
-                search_steps=search.steps,
-                search_starts=search.starts,
-                alone=gate.bounds,
-            )
-            for role, arm in zip(roles, responses, strict=True)
-        ]
-        if nothing_to_gain(gaps(asked, episodes, campaign.assessment.significance)):
-            return gate
-    return None
+    episodes = pd.concat([arm_tables(folder, each).episodes for each in gate.stages], ignore_index=True)
+    pair, *responses = (str(name) for name in episodes["arm"].unique()[:3])
+    roles: tuple[Role, Role] = ("ego", "non_ego")
+    asked = [
+        Response(
+            seed=stage.seed,
+            role=role,
+            persona=stage.persona,
+            round=0,
+            pair_arm=pair,
+            response_arm=arm,
+            ego="",
+            non_ego="",
+            search_steps=search.steps,
+            search_starts=search.starts,
+            alone=gate.bounds,
+        )
+        for role, arm in zip(roles, responses, strict=True)
+    ]
+    return nothing_to_gain(gaps(asked, episodes, campaign.assessment.significance))

@@ -23,7 +23,8 @@ from typing import Protocol, TypeAlias
 
 from harness.campaign.execution.schedule import Schedule
 from harness.campaign.execution.stage_run import SEGMENT_EPISODES, Attempt, Emit, Event, Help, RunContext, Task
-from harness.campaign.plan.stages import AssessmentStage, BestOf, PreventabilityStage, Stage
+from harness.campaign.plan.planned_drivers import BestOf
+from harness.campaign.plan.stages import AssessmentStage, PreventabilityStage, SelectionStage, Stage
 
 MOST_CRASHES = 3
 """Crashes of one segment or game after which it is not tried again."""
@@ -99,7 +100,7 @@ class Crashes:
         if self._counts[stage.id, place] < MOST_CRASHES:
             return Event(kind="crashed", stage=stage.id, message=cause)
         often = f"{cause}, {MOST_CRASHES} times"
-        if place is None or not isinstance(stage, AssessmentStage | PreventabilityStage):
+        if place is None or not isinstance(stage, AssessmentStage | SelectionStage | PreventabilityStage):
             return Event(kind="failed", stage=stage.id, message=often)
         abandoned = self._abandoned.setdefault(stage.id, {})
         abandoned[place] = often

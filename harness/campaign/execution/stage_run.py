@@ -19,7 +19,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
-from harness.campaign.plan.stages import AssessmentStage, External, Stage
+from harness.campaign.plan.planned_drivers import External
+from harness.campaign.plan.stages import AssessmentStage, Stage
 from harness.campaign.preflight import OpenCampaign
 from harness.campaign.storage.locks import held_by_worker
 from harness.campaign.storage.run_folder import RunFolder

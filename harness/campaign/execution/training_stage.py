@@ -10,7 +10,8 @@ import pandas as pd
 
 from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import StageRun
-from harness.campaign.plan.stages import SumoDriven, TrainingStage, description, driver_in
+from harness.campaign.plan.planned_drivers import SumoDriven, description, driver_in
+from harness.campaign.plan.stages import TrainingStage
 from harness.campaign.plan.strategy_stages import training_settings
 from harness.campaign.storage.versions import versions_since
 from harness.drivers.policy_file import persona_hash, policy_files, read_policy, write_policy

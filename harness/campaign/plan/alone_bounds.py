@@ -16,6 +16,8 @@ from harness.evaluation.strategies import (
     PersonaNonEgo,
     ReconfiguredEgo,
     RetrainedEgo,
+    RoundAnswer,
+    ShieldedEgo,
     Strategy,
     SumoNonEgo,
     strategy_name,
@@ -25,9 +27,9 @@ from harness.evaluation.strategies import (
 def alone_bounds(campaign: Campaign, *arms: Arm) -> tuple[AloneBound, ...]:
     """What the players of these arms have to achieve alone, each once.
 
-    A population or crowd stands for its members. SUMO's own driver as non-ego and the further egos of a cross-play have
-    no arm alone, and nothing is asked of them. A best response is a change of a player's strategy: its arm asks what
-    the pair asks.
+    A population or crowd stands for its members. SUMO's own driver as non-ego, the further egos of a cross-play and
+    rejected answers have no arm alone, and a shielded ego is judged by the one without its shield: nothing is asked of
+    them. A best response is a change of a player's strategy: its arm asks what the pair asks.
     """
     found = [
         bound
@@ -40,12 +42,12 @@ def alone_bounds(campaign: Campaign, *arms: Arm) -> tuple[AloneBound, ...]:
 
 
 def bound_of(campaign: Campaign, stage: TrainingStage) -> AloneBound | None:
-    """What the player that a training makes has to achieve alone; None for a best response.
+    """What the player that a training makes has to achieve alone; None for a best response and an answer.
 
     A best response is trained in games with its opponent only. It is the answer to one opponent, and not a driver for
-    the empty road.
+    the empty road. An answer of a later round is judged by its selection, and the player that goes on by its arm alone.
     """
-    if isinstance(stage.strategy, BestResponse):
+    if isinstance(stage.strategy, BestResponse | RoundAnswer):
         return None
     (bound,) = _bounds(campaign, stage.strategy)
     return bound
@@ -54,7 +56,7 @@ def bound_of(campaign: Campaign, stage: TrainingStage) -> AloneBound | None:
 def _bounds(campaign: Campaign, strategy: Strategy) -> Iterator[AloneBound]:
     asked = campaign.competence
     match strategy:
-        case SumoNonEgo() | OtherEgo() | BestResponse():
+        case SumoNonEgo() | OtherEgo() | BestResponse() | RoundAnswer() | ShieldedEgo():
             return
         case PersonaNonEgo(persona=persona):
             mixed = campaign.mixed_people.get(persona, ())

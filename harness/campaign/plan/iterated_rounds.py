@@ -11,6 +11,12 @@ Heinrich et al. 2015) |
 | equilibrium | the same, drawn by the equilibrium of the game between all strategies so far (policy-space response \
 oracles: Lanctot et al. 2017) |
 
+An answer is never worse than what it answers with. PPO may end anywhere, also below the policy that the player has. So
+a selection (`evaluation.game_theory.policy_selection`) follows each of these trainings: the player goes on with the
+best of the new answer and all its earlier policies, by games against what the training played against. A rejected
+answer takes part in the cross-play under that name. The paper's rounds 1 and 2 have no selection: whether a retrained
+ego is worse than the naive one is their question (RQ2).
+
 With `[best_response]` the rounds of a persona end early, when neither player's best response gains anything
 distinguishable from 0, after searches that do not lack power (`execution.run_stage`): the later stages have nothing to
 do.
@@ -27,19 +33,25 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from harness.campaign.plan.alone_bounds import alone_bounds
-from harness.campaign.plan.stages import (
-    AssessmentStage,
+from harness.campaign.plan.planned_drivers import (
     BestOf,
-    EquilibriumGate,
     EquilibriumMixture,
     FixedMixture,
+    PlannedDriver,
     Side,
-    Stage,
     Trained,
     TrainedBefore,
-    TrainingStage,
     members_of,
     persona_of,
+)
+from harness.campaign.plan.stages import (
+    AssessmentStage,
+    EquilibriumGate,
+    Gate,
+    RejectionGate,
+    SelectionStage,
+    Stage,
+    TrainingStage,
     stage_id,
 )
 from harness.campaign.plan.strategy_stages import SeedStages, ego_learns
@@ -54,6 +66,10 @@ from harness.evaluation.strategies import (
     PersonaNonEgo,
     ReconfiguredEgo,
     RetrainedEgo,
+    RoundAnswer,
+    player_of,
+    round_of,
+    strategy_name,
 )
 from harness.game.roles import EGO, NON_EGO
 
@@ -66,11 +82,16 @@ class PersonaRounds:
     non_egos: list[PersonaNonEgo]
     stages: list[Stage]
 
+    def rejected(self, player: int) -> list[RoundAnswer]:
+        """The answers of a player that a selection may reject, as they then play in the cross-play."""
+        found = [each.strategy for each in self.stages if isinstance(each, SelectionStage)]
+        return [RoundAnswer(of=each, is_rejected=True) for each in found if player_of(each) == player]
+
 
 def persona_rounds(of: SeedStages, persona: str, tunable: bool = False) -> PersonaRounds:
     """All rounds of a persona. The stages of rounds 0 to 2 are those of `paper_rounds`."""
     campaign = of.campaign
-    gates: tuple[EquilibriumGate, ...] = ()
+    gates: tuple[Gate, ...] = ()
     egos: list[EgoStrategy] = [NaiveEgo()]
     non_egos = [PersonaNonEgo(persona=persona)]
     stages: list[Stage] = []
@@ -88,7 +109,7 @@ def persona_rounds(of: SeedStages, persona: str, tunable: bool = False) -> Perso
             non_egos.append(PersonaNonEgo(persona=persona, round=round_))
         of.gates[egos[-1] if learner_is_ego else non_egos[-1]] = gates
         if round_ > PAPER_ROUNDS:
-            stages.extend(_plan_round(of, rounds, ego_learns=learner_is_ego))
+            stages.extend(_plan_round(of, rounds, gates, ego_learns=learner_is_ego))
         if campaign.stops_early and learner_is_ego and round_ < last:
             pair = of.pair(egos[-1], non_egos[-1])
             stages.extend(plan_best_responses(campaign, pair))
@@ -96,24 +117,63 @@ def persona_rounds(of: SeedStages, persona: str, tunable: bool = False) -> Perso
     return rounds
 
 
-def _plan_round(of: SeedStages, rounds: PersonaRounds, *, ego_learns: bool) -> list[Stage]:
-    """Train the latest strategy of a player, and assess it against the other player's latest and alone."""
+def _plan_round(of: SeedStages, rounds: PersonaRounds, gates: tuple[Gate, ...], *, ego_learns: bool) -> list[Stage]:
+    """Train an answer of a player, select with which policy it goes on, and assess this one against the other player's
+    latest strategy and alone."""
     egos, non_egos = rounds.egos, rounds.non_egos
     persona = non_egos[0].persona
-    strategy: EgoStrategy | PersonaNonEgo
+    own: Sequence[EgoStrategy] | Sequence[PersonaNonEgo]
     if ego_learns:
-        strategy, alone, others = egos[-1], Arm(ego=egos[-1]), [of.side(each) for each in non_egos]
+        own, alone, others = egos, Arm(ego=egos[-1]), [of.side(each) for each in non_egos]
         before = egos[:-1], non_egos
     else:
-        strategy, alone, others = non_egos[-1], Arm(non_ego=non_egos[-1]), [of.side(each) for each in egos]
+        own, alone, others = non_egos, Arm(non_ego=non_egos[-1]), [of.side(each) for each in egos]
         before = egos, non_egos[:-1]
     opponent, weighing = _opponent(of, others, *before)
+    strategy = own[-1]
+    assert isinstance(strategy, RetrainedEgo | PersonaNonEgo)
+    answer = RoundAnswer(of=strategy)
+    selected = stage_id(strategy_name(strategy), of.seed)
+    rejection = RejectionGate(selection=selected, answer=stage_id(strategy_name(answer), of.seed))
+    of.gates[answer] = gates
+    of.gates[replace(answer, is_rejected=True)] = (*gates, rejection)
+    training = of.training(answer, opponent, persona=persona)
     return [
         *weighing,
-        of.training(strategy, opponent, persona=persona),
+        training,
+        *_selections(of, training, strategy, [policy for each in own for policy in of.side(_as_trained(each))]),
         of.pair(egos[-1], non_egos[-1]),
         of.assessment(alone, persona=persona),
     ]
+
+
+def _selections(
+    of: SeedStages,
+    training: TrainingStage,
+    strategy: RetrainedEgo | PersonaNonEgo,
+    policies: Sequence[PlannedDriver],
+) -> list[SelectionStage]:
+    """The selection of a strategy after the training of its answer. None in a campaign with policies of another run,
+    which has the player's strategies from there."""
+    if of.campaign.policies is not None:
+        return []
+    selection = SelectionStage(
+        seed=of.seed,
+        persona=training.persona,
+        strategy=strategy,
+        candidates=tuple(each for each in policies if isinstance(each, Trained)),
+        opponent=training.opponent,
+        alone_share=training.alone_share,
+        gates=training.gates,
+    )
+    return [selection]
+
+
+def _as_trained(strategy: EgoStrategy | PersonaNonEgo) -> EgoStrategy | PersonaNonEgo | RoundAnswer:
+    """A strategy of a player's rounds as its training made it, whatever was selected after that."""
+    if isinstance(strategy, RetrainedEgo | PersonaNonEgo) and round_of(strategy) > PAPER_ROUNDS:
+        return RoundAnswer(of=strategy)
+    return strategy
 
 
 def _opponent(

@@ -6,15 +6,28 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from harness.campaign.plan.attribution_arms import plan_attribution
 from harness.campaign.plan.iterated_rounds import PersonaRounds, persona_rounds, plan_best_responses
 from harness.campaign.plan.paper_rounds import plan_paper_rounds, plan_robust, plan_searches
+from harness.campaign.plan.planned_drivers import Shielded, members_of
 from harness.campaign.plan.stages import AssessmentStage, PreventabilityStage, Stage, TrainingStage
 from harness.campaign.plan.strategy_stages import SeedStages, crossplay_name, ego_learns
 from harness.config.campaign import Campaign
 from harness.config.traits import UNREAD, PersonTraits
-from harness.evaluation.strategies import EgoStrategy, OtherEgo, ReconfiguredEgo, RetrainedEgo, RobustEgo
+from harness.evaluation.strategies import (
+    EgoStrategy,
+    NaiveEgo,
+    OtherEgo,
+    PersonaNonEgo,
+    ReconfiguredEgo,
+    RetrainedEgo,
+    RobustEgo,
+    RoundAnswer,
+    ShieldedEgo,
+)
+from harness.game.roles import EGO, NON_EGO
 
 
 def plan(
@@ -23,7 +36,8 @@ def plan(
     """Every stage of a campaign with these personas, each after those it needs.
 
     `tunable`: the campaign's ego is external and has tunable parameters. `traits`: those of the personas. A
-    campaign with a folder of policies trains nothing but best responses.
+    campaign with a folder of policies trains nothing but best responses, and has the player of each round from there:
+    nothing is selected.
     """
     seeds = [SeedStages(campaign=campaign, seed=seed, traits=traits) for seed in campaign.seeds]
     stages = [stage for of in seeds for stage in _plan_seed(of, personas, tunable)]
@@ -36,12 +50,14 @@ def _plan_seed(of: SeedStages, personas: Sequence[str], tunable: bool) -> list[S
     rounds = [persona_rounds(of, persona, tunable) for persona in personas]
     stages = [*plan_paper_rounds(of, personas), *plan_robust(of, personas)]
     stages += plan_searches(of, personas) if tunable else []
+    shielded = _plan_shielded(of.campaign, stages)
     stages += [stage for each in rounds for stage in each.stages]
     judged = list(stages)
     stages += _plan_crossplay(of, rounds)
     stages += _plan_responses(of, rounds, stages)
     stages += _plan_preventability(of.campaign, judged)
     stages += plan_attribution(of)
+    stages += shielded
     return list(dict.fromkeys(stages))
 
 
@@ -68,12 +84,26 @@ def _plan_preventability(campaign: Campaign, stages: Iterable[Stage]) -> list[Pr
     ]
 
 
+def _plan_shielded(campaign: Campaign, stages: Iterable[Stage]) -> list[AssessmentStage]:
+    """Each of these arms of an ego with the campaign's shield, too: the same policy in the same games."""
+    rule, found = campaign.ego.shield, []
+    for stage in stages:
+        ego = stage.arm.ego if isinstance(stage, AssessmentStage) else None
+        if rule is not None and isinstance(ego, NaiveEgo | RetrainedEgo | ReconfiguredEgo | RobustEgo):
+            assert isinstance(stage, AssessmentStage)
+            side = (Shielded(members=members_of(*stage.ego), rule=rule),)  # type: ignore[arg-type]
+            found.append(replace(stage, arm=replace(stage.arm, ego=ShieldedEgo(of=ego)), ego=side))
+    return found
+
+
 def _plan_crossplay(of: SeedStages, rounds: Sequence[PersonaRounds]) -> list[AssessmentStage]:
     if of.campaign.crossplay is None:
         return []
     egos = dict.fromkeys(ego for each in rounds for ego in each.egos)
     egos |= dict.fromkeys(_egos_of_no_persona(of.campaign, has_round_2=len(egos) > 1))
-    non_egos = [non_ego for each in rounds for non_ego in each.non_egos]
+    egos |= dict.fromkeys(answer for each in rounds for answer in each.rejected(EGO))
+    non_egos: list[PersonaNonEgo | RoundAnswer] = [non_ego for each in rounds for non_ego in each.non_egos]
+    non_egos += [answer for each in rounds for answer in each.rejected(NON_EGO)]
     return [of.pair(ego, non_ego) for ego in egos for non_ego in non_egos]
 
 

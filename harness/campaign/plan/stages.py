@@ -1,9 +1,5 @@
-"""The stages of a plan: trainings, parameter searches and arms. Each is done once, stored, and skipped afterwards.
-
-The two sides of a game are the ego and the non-egos. A persona drives in every place of the non-egos, a population is a
-mixture of personas in every place, and a crowd has a persona for each place: all are a `Side` of planned drivers, a
-closed union of which `execution.player_factory` makes drivers.
-"""
+"""The stages of a plan: trainings, parameter searches, selections and arms. Each is done once, stored, and skipped
+afterwards."""
 
 from __future__ import annotations
 
@@ -12,131 +8,26 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import ClassVar, TypeAlias
 
+from harness.campaign.plan.planned_drivers import (
+    EquilibriumMixture,
+    PlannedDriver,
+    Reconfigured,
+    Side,
+    Trained,
+    TrainedBefore,
+    members_of,
+)
 from harness.evaluation.competence import AloneBound
 from harness.evaluation.strategies import (
     Arm,
     BestResponse,
-    Borrowed,
+    PersonaNonEgo,
     ReconfiguredEgo,
+    RetrainedEgo,
     Strategy,
     player_of,
     strategy_name,
 )
-
-
-@dataclass(frozen=True, kw_only=True)
-class SumoDriven:
-    """SUMO's own models."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class External:
-    """The campaign's external ego, or another driver of its cross-play by name."""
-
-    name: str = ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Reconfigured:
-    """The external ego with the parameters that a search of this plan found."""
-
-    stage: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class Trained:
-    """The policy that a training of this plan makes."""
-
-    stage: str
-    persona: str = ""
-    """The persona with which it drives; empty: the ego's own."""
-    borrowed: Borrowed | None = None
-    """The trait with which it drives that is not the persona's own."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class TrainedBefore:
-    """The policy that a training of this name made in another run, read from the campaign's folder of policies."""
-
-    stage: str
-    persona: str = ""
-    """The persona with which it drives; empty: the ego's own."""
-    borrowed: Borrowed | None = None
-    """The trait with which it drives that is not the persona's own."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class FixedMixture:
-    """One of several drivers in each game, drawn by fixed shares."""
-
-    members: tuple[PlannedMember, ...]
-    shares: tuple[float, ...]
-
-
-@dataclass(frozen=True, kw_only=True)
-class EquilibriumMixture:
-    """One of several drivers in each game, drawn by the shares of an equilibrium."""
-
-    members: tuple[PlannedMember, ...]
-    arms: tuple[tuple[str, ...], ...]
-    """The assessments whose mean payoffs make the game: a row per ego, a column per non-ego."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class BestOf:
-    """Of several drivers the one with the highest mean payoff in games played for this choice alone."""
-
-    members: tuple[PlannedMember, ...]
-    persona: str = ""
-
-
-PlannedMember = SumoDriven | External | Reconfigured | Trained | TrainedBefore
-"""One driver, the same in every game."""
-PlannedDriver = PlannedMember | FixedMixture | EquilibriumMixture | BestOf
-Side: TypeAlias = tuple[PlannedDriver, ...]
-"""The drivers of a side: those of the non-egos' places in their order, from the first again where there are more places
-than drivers. Empty: the side takes no part."""
-
-
-def driver_in(side: Side, place: int) -> PlannedDriver | None:
-    """The driver of a side in one of its places; None: no one."""
-    return side[place % len(side)] if side else None
-
-
-def members_of(*drivers: PlannedDriver) -> tuple[PlannedMember, ...]:
-    """The drivers that may play: the members of mixtures and choices, or the drivers themselves."""
-    several = FixedMixture | EquilibriumMixture | BestOf
-    members = (driver.members if isinstance(driver, several) else (driver,) for driver in drivers)
-    return tuple(chain.from_iterable(members))
-
-
-def persona_of(driver: PlannedDriver) -> str:
-    """The name of the persona with which a driver drives; empty: the ego's own."""
-    match driver:
-        case Trained(persona=persona) | TrainedBefore(persona=persona) | BestOf(persona=persona):
-            return persona
-        case _:
-            return ""
-
-
-def borrowed_of(driver: PlannedDriver) -> Borrowed | None:
-    """The trait with which a driver drives that is not its persona's own."""
-    return driver.borrowed if isinstance(driver, Trained | TrainedBefore) else None
-
-
-def description(driver: PlannedDriver) -> str:
-    """The driver as the card of a policy names its opponent."""
-    match driver:
-        case SumoDriven():
-            return "sumo"
-        case External(name=name):
-            return name or "given"
-        case Reconfigured(stage=stage) | Trained(stage=stage) | TrainedBefore(stage=stage):
-            return stage
-        case BestOf():
-            return "best"
-        case FixedMixture(members=members) | EquilibriumMixture(members=members):
-            return "one in each game of " + ", ".join(description(each) for each in members)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,11 +49,26 @@ class EquilibriumGate:
 
 
 @dataclass(frozen=True, kw_only=True)
+class RejectionGate:
+    """A selection: the stages behind the gate are about its new answer, and have nothing to do where it was taken."""
+
+    selection: str
+    answer: str
+
+    @property
+    def stages(self) -> tuple[str, ...]:
+        return (self.selection,)
+
+
+Gate: TypeAlias = EquilibriumGate | RejectionGate
+
+
+@dataclass(frozen=True, kw_only=True)
 class _Stage:
     seed: int
     persona: str
     """The persona or population that the stage belongs to; empty for the naive ego's own."""
-    gates: tuple[EquilibriumGate, ...] = ()
+    gates: tuple[Gate, ...] = ()
 
     kind: ClassVar[str]
     """What the manifest calls it."""
@@ -284,6 +190,44 @@ class SearchStage(_Stage):
 
 
 @dataclass(frozen=True, kw_only=True)
+class SelectionStage(_Stage):
+    """The end of a player's turn in a later round: it goes on with the best of the policies that it has."""
+
+    strategy: RetrainedEgo | PersonaNonEgo
+    """The player's strategy of this round, which the selection makes."""
+    candidates: tuple[Trained, ...]
+    """All policies of the player so far, the oldest first and the new answer last."""
+    opponent: Side
+    """What the training of the answer played against."""
+    alone_share: float
+    """The share of that training's games without the opponent."""
+
+    kind, verb, unit = "selection", "select", "episodes"
+
+    @property
+    def name(self) -> str:
+        return strategy_name(self.strategy)
+
+    @property
+    def learner(self) -> int:
+        """The player (index of `ROLES`) that goes on."""
+        return player_of(self.strategy)
+
+    @property
+    def round(self) -> int:
+        return self.strategy.round
+
+    @property
+    def answer(self) -> Trained:
+        """The policy of this round's training."""
+        return self.candidates[-1]
+
+    @property
+    def drivers(self) -> tuple[PlannedDriver, ...]:
+        return (*self.candidates, *self.opponent)
+
+
+@dataclass(frozen=True, kw_only=True)
 class PreventabilityStage(_Stage):
     """The judgement of an arm's failures: which of them the reference drivers prevent."""
 
@@ -305,7 +249,7 @@ class PreventabilityStage(_Stage):
         return (self.of.id, *super().needs)
 
 
-Stage = TrainingStage | AssessmentStage | SearchStage | PreventabilityStage
+Stage = TrainingStage | AssessmentStage | SearchStage | SelectionStage | PreventabilityStage
 
 
 def stage_id(name: str, seed: int) -> str:

@@ -8,9 +8,7 @@ from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import PurePath
 
-from harness.campaign.plan.stages import (
-    AssessmentStage,
-    EquilibriumGate,
+from harness.campaign.plan.planned_drivers import (
     External,
     FixedMixture,
     PlannedDriver,
@@ -20,11 +18,10 @@ from harness.campaign.plan.stages import (
     SumoDriven,
     Trained,
     TrainedBefore,
-    TrainingStage,
     members_of,
     persona_of,
-    stage_id,
 )
+from harness.campaign.plan.stages import AssessmentStage, Gate, TrainingStage, stage_id
 from harness.config.campaign import LEARNED, SUMO, Campaign
 from harness.config.training import ATTENTIVE_SHARE, Training
 from harness.config.traits import PAYOFF, UNREAD, PersonTraits
@@ -37,7 +34,7 @@ from harness.evaluation.strategies import (
     OtherEgo,
     PersonaNonEgo,
     ReconfiguredEgo,
-    RetrainedEgo,
+    RoundAnswer,
     SumoNonEgo,
     player_of,
     strategy_name,
@@ -65,8 +62,8 @@ class SeedStages:
     campaign: Campaign
     seed: int
     traits: PersonTraits = UNREAD
-    gates: dict[EgoStrategy | NonEgoStrategy, tuple[EquilibriumGate, ...]] = field(default_factory=dict)
-    """Of the strategies after round 2: the gates before their trainings."""
+    gates: dict[EgoStrategy | NonEgoStrategy, tuple[Gate, ...]] = field(default_factory=dict)
+    """Of the strategies after round 2: the gates before their stages."""
 
     def side(self, strategy: EgoStrategy | NonEgoStrategy | None) -> Side:
         """The side that plays a strategy; no one for None."""
@@ -83,21 +80,23 @@ class SeedStages:
         members = tuple(self._driver(PersonaNonEgo(persona=name)) for name in shares)
         return members[0] if len(members) == 1 else FixedMixture(members=members, shares=tuple(shares.values()))
 
-    def pair(self, ego: EgoStrategy, non_ego: PersonaNonEgo) -> AssessmentStage:
+    def pair(self, ego: EgoStrategy, non_ego: PersonaNonEgo | RoundAnswer) -> AssessmentStage:
         """The assessment of an ego against a person."""
-        return self.assessment(Arm(ego=ego, non_ego=non_ego), persona=non_ego.persona)
+        person = non_ego.of if isinstance(non_ego, RoundAnswer) else non_ego
+        assert isinstance(person, PersonaNonEgo)
+        return self.assessment(Arm(ego=ego, non_ego=non_ego), persona=person.persona)
 
     def assessment(self, arm: Arm, *, persona: str = "") -> AssessmentStage:
         ego, non_ego = self.side(arm.ego), self.side(arm.non_ego)
-        gates = [self.gates[each] for each in (arm.ego, arm.non_ego) if each in self.gates]
         # a later strategy of a persona has the gates of the earlier ones of this persona
-        if isinstance(arm.ego, RetrainedEgo) and arm.ego.against == persona:
-            gates = [max(gates, key=len, default=())]
+        gates = chain.from_iterable(self.gates[each] for each in (arm.ego, arm.non_ego) if each in self.gates)
         return AssessmentStage(
-            seed=self.seed, persona=persona, arm=arm, ego=ego, non_ego=non_ego, gates=tuple(chain.from_iterable(gates))
+            seed=self.seed, persona=persona, arm=arm, ego=ego, non_ego=non_ego, gates=tuple(dict.fromkeys(gates))
         )
 
-    def training(self, strategy: EgoStrategy | PersonaNonEgo, opponent: Side, *, persona: str = "") -> TrainingStage:
+    def training(
+        self, strategy: EgoStrategy | PersonaNonEgo | RoundAnswer, opponent: Side, *, persona: str = ""
+    ) -> TrainingStage:
         """The training of a person, or of an ego after the naive one."""
         campaign, is_person = self.campaign, player_of(strategy) == NON_EGO
         warm = campaign.retraining.warm_start and not is_person
@@ -125,7 +124,9 @@ class SeedStages:
             case PersonaNonEgo(persona=persona, borrowed=Borrowed(trait=trait, of=of) as borrowed):
                 policy = PersonaNonEgo(persona=of) if trait == PAYOFF else replace(strategy, borrowed=None)
                 return replace(self._learned(policy, persona), borrowed=borrowed)
-            case PersonaNonEgo(persona=persona):
+            case RoundAnswer(of=of, is_rejected=True):
+                return self._driver(RoundAnswer(of=of))
+            case PersonaNonEgo(persona=persona) | RoundAnswer(of=PersonaNonEgo(persona=persona)):
                 return self._learned(strategy, persona)
             case _:
                 return self._learned(strategy)

@@ -20,6 +20,7 @@ from harness.evaluation.comparisons.acceptance_checks import Evidence, judge
 from harness.evaluation.comparisons.comparison import compare, games_by_arm
 from harness.evaluation.comparisons.over_trainings import compare_over_trainings
 from harness.evaluation.comparisons.preventability import count_prevented
+from harness.evaluation.comparisons.shield_comparison import compare_shielded
 from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.competence import Goals, goals_alone
 from harness.evaluation.game_theory.findings import GameFindings, find
@@ -50,6 +51,8 @@ def evaluated(run: ReadRun) -> RunTables:
         over_trainings=compare_over_trainings(asked, run.episodes, significance),
         training=_with_ends(run.training, entries),
         reconfiguration=run.reconfiguration,
+        selections=run.selections,
+        shields=compare_shielded(_arms(run), run.episodes),
         manoeuvres=run.manoeuvres,
         causes=run.causes,
         realism=found,
@@ -82,6 +85,8 @@ def csv_tables(run: ReadRun, tables: RunTables) -> dict[str, pd.DataFrame]:
     names += ["over_trainings"] if len(tables.over_trainings) else []
     names += ["populations"] if run.campaign.population else []
     names += ["reconfiguration"] if is_tuned(run.manifest) else []
+    names += ["shields"] if run.campaign.ego.shield is not None else []
+    names += ["selections"] if len(run.selections) else []
     found = {"conduct": run.conduct} | {name: getattr(tables, name) for name in names}
     return found | (tables.game.tables if tables.game is not None else {})
 

@@ -12,7 +12,8 @@ from typing import Any
 
 import pandas as pd
 
-from harness.campaign.plan.stages import AssessmentStage, Trained
+from harness.campaign.plan.planned_drivers import Trained
+from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.storage.manifest import planned
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign
@@ -22,7 +23,7 @@ from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.strategies import NaiveEgo, strategy_name
 from harness.files import write_atomically
 from harness.game.payoff_terms import GROUPS, TERMS
-from harness.game.roles import NON_EGO, ROLES
+from harness.game.roles import EGO, NON_EGO, ROLES
 from harness.reports.human_ranges import crashes_alone
 from harness.reports.learning import stopped
 from harness.reports.numbers import MISSING, interval, number, percent
@@ -40,8 +41,8 @@ def write_model_cards(
     summary: pd.DataFrame,
     realism: pd.DataFrame,
 ) -> None:
-    """Write the card of every policy of `policies`, the policy.json of each training stage. `summary` and `realism` are
-    the run's tables of these names."""
+    """Write the card of every policy of `policies`, the policy.json of each training or selection. `summary` and
+    `realism` are the run's tables of these names."""
     cards = {stage: model_card(stage, manifest, summary, realism, policy) for stage, policy in policies.items()}
     for stage, card in cards.items():
         write_atomically(folder.policy(stage) / CARD, card.encode())
@@ -50,8 +51,8 @@ def write_model_cards(
 def model_card(
     stage: str, manifest: Mapping[str, Any], summary: pd.DataFrame, realism: pd.DataFrame, policy: Mapping[str, Any]
 ) -> str:
-    """The card of the policy that a training stage made; `policy` is the content of its policy.json."""
-    entry = manifest["stages"][stage]
+    """The card of the policy that a training made or a selection chose; `policy` is the content of its policy.json."""
+    entry = manifest["stages"][policy.get("selected") or stage]
     is_ego = policy["player"] != ROLES[NON_EGO]
     document = manifest["ego_persona"] if is_ego else manifest["persona_documents"][entry["persona"]]
     persona = Persona.from_record(document)
@@ -93,6 +94,8 @@ def _facts(
     campaign = Campaign.model_validate(manifest["campaign"], strict=False)
     against = policy["against"]
     yield "player", policy["player"]
+    if policy.get("selected"):
+        yield "the same policy as", f"`{policy['selected']}`, chosen by a selection (`selections.csv`)"
     yield "persona", f"`{persona.name}`"
     yield "scene", f"`{policy['scene']}`"
     partner = {None: "no other player", "sumo": "SUMO's own driver", "given": _given(manifest, campaign)}
@@ -100,7 +103,7 @@ def _facts(
     if isinstance(people := policy.get("people"), int) and against is not None:
         yield "people in a game", str(people)
     if against is not None:
-        yield "games without the other player", percent(_alone_share(entry, campaign))
+        yield "games without the other player", percent(_alone_share(entry, policy, campaign))
     yield "initial policy", f"`{policy['began_from']}`" if policy["began_from"] else _beginning(policy["training"])
     reason = {"converged": "stopped by convergence", "budget": "the whole budget"}.get(entry["stopped"], "")
     reason = stopped(entry) if entry["stopped"] == DID_NOT_LEARN else reason
@@ -117,10 +120,10 @@ def _beginning(settings: Mapping[str, Any]) -> str:
     return f"none; it imitated a rule-based driver, shown in {shown:,} steps" if shown else "none"
 
 
-def _alone_share(entry: Mapping[str, Any], campaign: Campaign) -> float:
+def _alone_share(entry: Mapping[str, Any], policy: Mapping[str, Any], campaign: Campaign) -> float:
     if entry["name"] == strategy_name(NaiveEgo()):
         return campaign.naive_training.alone_share
-    how = campaign.retraining if entry["name"] != entry["persona"] else campaign.non_ego_training
+    how = campaign.retraining if policy["player"] == ROLES[EGO] else campaign.non_ego_training
     return how.alone_share
 
 

@@ -15,7 +15,7 @@ from harness.campaign.plan.stages import Stage, stage_id
 from harness.campaign.results.shown_work import doing
 from harness.campaign.storage.arm_tables import PLAYED, arm_tables
 from harness.campaign.storage.manifest import planned
-from harness.campaign.storage.run_folder import JUDGED, RunFolder
+from harness.campaign.storage.run_folder import JUDGED, SELECTED, RunFolder
 from harness.config.campaign import Campaign
 from harness.config.toml_reading import Document
 from harness.drivers.policy_file import policy_files, read_card
@@ -30,6 +30,7 @@ class _PolicyCard(Document):
     player: Literal["ego", "non_ego"]
     scene: str = Field(max_length=1000)
     against: str | None = Field(max_length=1000)
+    selected: str | None = Field(None, max_length=1000)
     began_from: str | None = Field(max_length=1000)
     training: dict[str, bool | int | float | str | list[int] | None]
 
@@ -44,13 +45,14 @@ class ReadRun:
     """All that are planned."""
     scene: OpenScene
     policies: Mapping[str, Mapping[str, Any]]
-    """The policy.json of each policy that was trained, by its stage."""
+    """The policy.json of each policy that was trained or selected, by its stage."""
     episodes: pd.DataFrame
     causes: pd.DataFrame
     manoeuvres: pd.DataFrame
     conduct: pd.DataFrame
     training: pd.DataFrame
     reconfiguration: pd.DataFrame
+    selections: pd.DataFrame
     reference_drivers: pd.DataFrame | None
     """None where no arm's failures are judged."""
 
@@ -71,7 +73,9 @@ def read_run(folder: RunFolder, console: Console) -> ReadRun:
         _check_log(folder, stage, manifest["stages"][stage])
     training = joined("training", _gathered(folder, manifest, "training", "training.csv"))
     searches = joined("reconfiguration", _gathered(folder, manifest, "reconfiguration", "reconfiguration.csv"))
-    policies = {stage: _policy(folder.policy(stage)) for stage in _done(manifest, "training")}
+    selections = joined("selections", _gathered(folder, manifest, "selection", SELECTED))
+    made = [*_done(manifest, "training"), *_done(manifest, "selection")]
+    policies = {stage: _policy(folder.policy(stage)) for stage in made}
     judged = list(_gathered(folder, manifest, "preventability", JUDGED))
     with doing(console, "measuring the games"):
         arms = [arm_tables(folder, stage, scene) for stage in _done(manifest, "assessment")]
@@ -87,6 +91,7 @@ def read_run(folder: RunFolder, console: Console) -> ReadRun:
         conduct=joined("conduct", [arm.conduct for arm in arms]),
         training=training,
         reconfiguration=searches,
+        selections=selections,
         reference_drivers=joined("reference_drivers", judged) if judged else None,
     )
 
@@ -134,7 +139,13 @@ def _gathered(folder: RunFolder, manifest: Mapping[str, Any], kind: str, table: 
     for stage in _done(manifest, kind):
         file = folder.work(stage) / table
         frame = read_csv(file)
-        names = frame["arm"] + "_preventability" if kind == "preventability" else frame["stage"]
+        match kind:
+            case "preventability":
+                names = frame["arm"] + "_preventability"
+            case "selection":
+                names = frame["strategy"]
+            case _:
+                names = frame["stage"]
         _check_rows(file, manifest["stages"][stage], names, frame["seed"])
         if kind == "reconfiguration" and not is_of_a_search(frame):
             raise UsageError.of(file, "", "has rows of no search", "run the campaign again")

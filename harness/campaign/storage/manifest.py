@@ -30,7 +30,7 @@ Text = Annotated[str, Field(max_length=10_000)]
 _MOST_LISTED = 3
 _STAGE = re.compile(r"[A-Za-z][A-Za-z0-9_]*-seed\d+")
 FINISHED = ("done", "settled")
-"""Statuses of a finished stage; `settled`: an approximate equilibrium left nothing to do."""
+"""Statuses of a finished stage; `settled`: an approximate equilibrium or a taken answer left nothing to do."""
 
 
 class _Record(Document):
@@ -38,7 +38,7 @@ class _Record(Document):
 
 
 class StageEntry(_Record):
-    kind: Literal["training", "assessment", "reconfiguration", "preventability"]
+    kind: Literal["training", "assessment", "reconfiguration", "selection", "preventability"]
     name: Text
     persona: Name | Literal[""] = ""
     seed: Seed
@@ -57,6 +57,8 @@ class StageEntry(_Record):
     trials_unplayed: Count | None = None
     chosen_trial: Count | None = None
     settled: Text | None = None
+    chosen: Text | None = None
+    """Of a selection, and of an arm with a best response: the training whose policy was taken."""
     goals: Count | None = None
     """Of an arm in which a player drives alone, and of the training that made the player: games that it ended at its
     goal."""

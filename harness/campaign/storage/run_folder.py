@@ -37,8 +37,8 @@ from harness.errors import Problem, UsageError
 from harness.files import content_of, drop_scratch, has_digest, leads_out, make_folder, write_atomically
 
 MANIFEST = "manifest.json"
-JUDGED = "reference_drivers.csv"
-"""The table that the judgement of an arm's failures makes."""
+JUDGED, SELECTED = "reference_drivers.csv", "selections.csv"
+"""The tables that the judgement of an arm's failures, and a selection, make."""
 _PATIENCE_S = 10.0  # the time that workers of a killed command may take to end
 _MOST_MANIFEST_BYTES = 50_000_000
 _RUN = "run the campaign again"

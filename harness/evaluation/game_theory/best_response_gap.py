@@ -4,9 +4,11 @@ For each response, games are paired by seed and episode: the pair's game against
 replaced by its best known response. The gap is the mean difference of that player's payoff. It is a lower bound: a
 better response may exist, so a gap that is not distinguishable from 0 does not prove an equilibrium.
 
-The known responses are the one that the search trained, and the campaign's other strategies of this player that met the
-same other player. The best of several means is too high on average. Therefore the choice is cross-fitted: for the games
-of even episodes the response with the highest mean payoff in the odd ones is taken, and the reverse.
+The known responses are the player's own strategy, the one that the search trained, and the campaign's other strategies
+of this player that met the same other player. So a response is never worse than what it answers with: where nothing
+earned more, the player keeps its own, and the gap is 0. The best of several means is too high on average. Therefore the
+choice is cross-fitted: for the games of even episodes the response with the highest mean payoff in the odd ones is
+taken, and the reverse.
 """
 
 from __future__ import annotations
@@ -34,6 +36,8 @@ from harness.game.arrays import FloatArray, IntArray
 Role = Literal["ego", "non_ego"]
 SEARCH = "the search"
 """The response that the search trained, in the column `best_known`. No strategy has a space in its name."""
+OWN = "its own strategy"
+"""The response of a player that changes nothing, in the same column."""
 LEAST_OF_HALF = 2
 """Fewer games in a half choose no response: only the search counts."""
 
@@ -94,17 +98,18 @@ def nothing_to_gain(found: pd.DataFrame) -> bool:
 
 
 def _row(response: Response, games: Mapping[Any, pd.DataFrame]) -> dict[str, object]:
-    known, left_out, (pair, *responses), episodes = _compared(response, games)
+    known, left_out, (pair, search, *others), episodes = _compared(response, games)
     closed = gate(response.alone, response.seed, games)
     row = vars(response) | closed | {"pairs": len(pair), "pairs_left_out": left_out, "known": len(known)}
     if not len(pair):
         return row
-    taken = _cross_fitted(np.stack([each[:, 0] for each in responses]), episodes)
-    search, best = responses[0], np.stack(responses)[taken, np.arange(len(pair))]
+    responses = {OWN: pair, SEARCH: search, **dict(zip(known, others, strict=True))}
+    taken = _cross_fitted(np.stack([each[:, 0] for each in responses.values()]), episodes)
+    best = np.stack(list(responses.values()))[taken, np.arange(len(pair))]
     payoff = float(pair[:, 0].mean())
     test = paired_t_test(pair[:, 0], best[:, 0], closed)
     row |= test | {"payoff": payoff, "payoff_best_response": best[:, 0].mean(), "gap": test["mean_difference"]}
-    row["best_known"] = " + ".join([SEARCH, *known][place] for place in sorted(set(taken.tolist())))
+    row["best_known"] = " + ".join(list(responses)[place] for place in sorted(set(taken.tolist())))
     if payoff != 0:
         row["gap_share"] = test["mean_difference"] / abs(payoff)
     of_search = paired_t_test(pair[:, 0], search[:, 0], closed)
@@ -139,9 +144,9 @@ def _compared(
 
 def _cross_fitted(payoffs: FloatArray, episodes: IntArray) -> IntArray:
     """For each of N games the place of the response to take: that of the highest mean payoff, of [K, N], in the other
-    half of the games. Of equal ones the first."""
-    if len(payoffs) == 1:
-        return np.zeros(len(episodes), dtype=np.int64)
+    half of the games. Of equal ones the first. With too few games in a half it is the second, the search."""
+    if np.bincount(episodes % 2, minlength=2).min() < LEAST_OF_HALF:
+        return np.ones(len(episodes), dtype=np.int64)
     of_even, of_odd = (payoffs[:, episodes % 2 == half].mean(axis=1).argmax() for half in (0, 1))
     return np.where(episodes % 2 == 0, of_odd, of_even)
 
@@ -159,6 +164,6 @@ def _verdict(row: Mapping[Any, Any], significance: float) -> GapVerdict:
         return GapVerdict.ALL_EQUAL
     if row["search_gap"] < 0 and not row["search_gap_high"] >= 0:  # NaN: less by the same number in every game
         return GapVerdict.LACKS_POWER
-    if np.isnan(row["p_value"]) and row["gap"] == 0:
+    if row["search_gap"] == 0 and np.isnan(row["search_gap_low"]) and row["gap"] == 0:
         return GapVerdict.NO_DIFFERENCE
     return GapVerdict.NOT_DISTINGUISHABLE if row["gap"] > 0 else GapVerdict.NONE_FOUND

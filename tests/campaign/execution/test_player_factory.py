@@ -9,7 +9,7 @@ import pytest
 
 from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import RunContext
-from harness.campaign.plan.stages import PlannedDriver, Trained, TrainedBefore
+from harness.campaign.plan.planned_drivers import PlannedDriver, Trained, TrainedBefore
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign
 from harness.config.persona import Persona

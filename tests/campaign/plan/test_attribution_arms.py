@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 
 from harness.campaign.plan.attribution_arms import trait_questions
-from harness.campaign.plan.stages import AssessmentStage, SumoDriven, Trained, TrainingStage
+from harness.campaign.plan.planned_drivers import SumoDriven, Trained
+from harness.campaign.plan.stages import AssessmentStage, TrainingStage
 from harness.campaign.preflight import open_campaign
 from harness.config.traits import PersonTraits
 from harness.errors import UsageError

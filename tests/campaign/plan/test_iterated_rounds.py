@@ -9,18 +9,17 @@ from typing import Any
 import pytest
 
 from harness.campaign.plan.paper_rounds import plan_paper_rounds
-from harness.campaign.plan.stages import (
+from harness.campaign.plan.planned_drivers import (
     BestOf,
-    EquilibriumGate,
     EquilibriumMixture,
     FixedMixture,
     Side,
     Trained,
     TrainedBefore,
-    TrainingStage,
     description,
     members_of,
 )
+from harness.campaign.plan.stages import EquilibriumGate, RejectionGate, SelectionStage, TrainingStage
 from harness.campaign.plan.strategy_stages import SeedStages, crossplay_name, training_settings
 from harness.campaign.preflight import open_campaign
 from harness.errors import UsageError
@@ -48,7 +47,7 @@ def test_plan__two_rounds_are_the_papers() -> None:
 
 def test_plan__in_odd_rounds_the_non_ego_answers_and_in_even_ones_the_ego() -> None:
     stages = stages_of("anna", rounds={"count": 5})
-    names = ("anna_round3", "retrained_anna_round4", "anna_round5")
+    names = ("anna_round3_answer", "retrained_anna_round4_answer", "anna_round5_answer")
     assert [stages[name].learner for name in names] == [NON_EGO, EGO, NON_EGO]
     assert "retrained_anna_round6" not in stages
     assert names_of(stages["retrained_anna_round4_vs_anna_round3"].ego) == ["retrained_anna_round4"]
@@ -60,7 +59,8 @@ def test_plan__in_odd_rounds_the_non_ego_answers_and_in_even_ones_the_ego() -> N
 )
 def test_plan__a_player_answers_the_opponent_that_the_campaign_names(against: str, kind: type) -> None:
     stages = stages_of("anna", rounds={"count": 5, "against": against})
-    opponents = [stages[name].opponent for name in ("anna_round3", "retrained_anna_round4", "anna_round5")]
+    names = ("anna_round3_answer", "retrained_anna_round4_answer", "anna_round5_answer")
+    opponents = [stages[name].opponent for name in names]
     egos = ["naive", "retrained_anna", "retrained_anna_round4"]
     all_before = [egos[:2], ["anna", "anna_round3"], egos]
     expected = [each[-1:] for each in all_before] if against == "latest" else all_before
@@ -72,7 +72,7 @@ def test_plan__a_player_answers_the_opponent_that_the_campaign_names(against: st
 
 
 def test_plan__an_equilibrium_is_of_all_strategies_before_the_round() -> None:
-    training = stages_of("anna", rounds={"count": 4, "against": "equilibrium"})["retrained_anna_round4"]
+    training = stages_of("anna", rounds={"count": 4, "against": "equilibrium"})["retrained_anna_round4_answer"]
     (opponent,) = training.opponent
     assert opponent.arms == (
         ("naive_vs_anna-seed1", "naive_vs_anna_round3-seed1"),
@@ -109,6 +109,59 @@ def test_plan__what_a_stage_needs_stands_before_it(changes: dict[str, Any]) -> N
         assert set(stage.needs) <= before, stage.id
         assert len(set(stage.needs)) == len(stage.needs)
         before.add(stage.id)
+
+
+# --- selections ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize("against", ["latest", "all", "equilibrium"])
+def test_plan__a_player_goes_on_with_the_best_of_all_its_policies(against: str) -> None:
+    """It is selected by games against what its answer was trained against, with the same share alone on the road."""
+    stages = stages_of("anna", rounds={"count": 6, "against": against})
+    candidates = {
+        "anna_round3": ["anna", "anna_round3_answer"],
+        "retrained_anna_round4": ["naive", "retrained_anna", "retrained_anna_round4_answer"],
+        "anna_round5": ["anna", "anna_round3_answer", "anna_round5_answer"],
+        "retrained_anna_round6": [
+            *("naive", "retrained_anna", "retrained_anna_round4_answer", "retrained_anna_round6_answer"),
+        ],
+    }
+    selections = {name: stage for name, stage in stages.items() if isinstance(stage, SelectionStage)}
+    assert {name: names_of(each.candidates) for name, each in selections.items()} == candidates
+    for name, selection in selections.items():
+        training = stages[f"{name}_answer"]
+        assert (selection.opponent, selection.alone_share) == (training.opponent, training.alone_share)
+        assert training.id == selection.answer.stage
+        assert training.id in selection.needs
+    assert {each.alone_share for each in selections.values()} == {0.25, 0.5}
+
+
+def test_plan__the_papers_rounds_select_nothing() -> None:
+    assert not any(isinstance(stage, SelectionStage) for stage in stages_of(*BOTH, crossplay={}).values())
+
+
+def test_plan__policies_of_another_run_are_the_players_of_their_rounds() -> None:
+    stages = stages_of("anna", policies="policies", rounds={"count": 4}, crossplay={})
+    assert not any(isinstance(stage, SelectionStage) for stage in stages.values())
+    assert not any("rejected" in name or "answer" in name for name in stages)
+    assert stages["retrained_anna_round4_alone"].ego == (TrainedBefore(stage="retrained_anna_round4-seed1"),)
+
+
+def test_plan__a_rejected_answer_meets_everyone_of_the_cross_play() -> None:
+    stages = stages_of("anna", rounds={"count": 4}, crossplay={"egos": ["sumo"]})
+    rejected = {name: stage for name, stage in stages.items() if "rejected" in name}
+    non_egos = ("anna", "anna_round3", "anna_round3_rejected")
+    assert set(rejected) == {
+        *(f"retrained_anna_round4_rejected_vs_{each}" for each in non_egos),
+        *(f"{ego}_vs_anna_round3_rejected" for ego in ("naive", "retrained_anna", "retrained_anna_round4", "sumo")),
+    }
+    arm = rejected["retrained_anna_round4_rejected_vs_anna_round3_rejected"]
+    assert (names_of(arm.ego), names_of(arm.non_ego)) == (["retrained_anna_round4_answer"], ["anna_round3_answer"])
+    assert arm.gates == (
+        RejectionGate(selection="retrained_anna_round4-seed1", answer="retrained_anna_round4_answer-seed1"),
+        RejectionGate(selection="anna_round3-seed1", answer="anna_round3_answer-seed1"),
+    )
+    assert {gate.selection for gate in arm.gates} <= set(arm.needs)
 
 
 # --- best responses ---------------------------------------------------------------
@@ -149,7 +202,7 @@ def test_plan__rounds_may_end_after_each_answer_of_the_ego() -> None:
         non_ego_response="retrained_vs_anna_non_ego_response-seed1",
     )
     assert stages["retrained_anna"].gates == ()
-    assert stages["anna_round3"].gates == (second,)
+    assert stages["anna_round3"].gates == stages["anna_round3_answer"].gates == (second,)
     first, last = stages["anna_round5"].gates
     assert first == second
     assert last.pair == "retrained_anna_round4_vs_anna_round3-seed1"
@@ -196,7 +249,7 @@ def test_settings__several_people_in_one_place_multiply_the_budget() -> None:
     for name in ("robust", "retrained_town"):
         settings = training_settings(campaign, stages[name])
         assert (settings.steps, settings.segment_steps) == (2 * once.steps, 2 * once.segment_steps)
-    for name in ("naive", "retrained_anna", "retrained_anna_round4", "retrained_crowd"):
+    for name in ("naive", "retrained_anna", "retrained_anna_round4_answer", "retrained_crowd"):
         assert training_settings(campaign, stages[name]) == once  # of one person's strategies it meets one
 
 
@@ -261,6 +314,7 @@ def test_plan__a_population_is_met_as_a_persona_is(tmp_path: Path) -> None:
         ({"crossplay": {"egos": ["sumo", "sumo"]}}, "crossplay.egos", "two drivers"),
         ({"crossplay": {"egos": ["learned"]}}, "crossplay.egos", "always take part"),
         ({"ego": {"driver": "sumo", "persona": str(CAREFUL)}, "rounds": {"count": 4}}, "rounds.count", "not learn"),
+        ({"ego": {"driver": "sumo", "persona": str(CAREFUL), "shield": "rss"}}, "ego.shield", "SUMO drives this ego"),
         (
             {"ego": {"driver": "sumo", "persona": str(CAREFUL)}, "crossplay": {"egos": ["sumo"]}},
             "crossplay",

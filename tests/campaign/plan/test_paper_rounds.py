@@ -10,14 +10,8 @@ import pytest
 
 from harness.campaign.plan.paper_rounds import questions
 from harness.campaign.plan.plan import plan
-from harness.campaign.plan.stages import (
-    AssessmentStage,
-    PreventabilityStage,
-    SumoDriven,
-    Trained,
-    TrainingStage,
-    description,
-)
+from harness.campaign.plan.planned_drivers import Shielded, SumoDriven, Trained, description
+from harness.campaign.plan.stages import AssessmentStage, PreventabilityStage, TrainingStage
 from harness.config.traits import PersonTraits
 from harness.drivers.policy_file import write_policy
 from harness.evaluation.strategies import ATTENTIVE
@@ -56,6 +50,21 @@ def test_plan__pairings_of_a_learned_ego() -> None:
         "retrained_vs_anna": ["retrained_anna-seed1", "anna-seed1"],
         "retrained_alone_anna": ["retrained_anna-seed1", None],
     }
+
+
+def test_plan__a_shield_plays_each_arm_of_an_ego_once_more_and_changes_no_other_stage() -> None:
+    """Of the rounds up to 2: the same policies, with nothing trained and judged anew."""
+    asked: dict[str, Any] = {"retraining": {"against": ["bert"]}, "rounds": {"count": 4}, "crossplay": {}}
+    without, stages = (stages_of("anna", "bert", ego=ego, **asked) for ego in ({}, {"shield": "rss"}))
+    egos = ("naive", "retrained", "robust")
+    shielded = {f"shielded_{name}" for name in without if name.startswith(egos) and "_round" not in name}
+    shielded = {name for name in shielded if "_vs_" in name or "_alone" in name}
+    shielded -= {name for name in shielded if name.count("retrained_anna_vs") or name.count("retrained_bert_vs")}
+    assert stages.keys() - without.keys() == shielded
+    assert {name: stages[name] for name in without} == without
+    arm = stages["shielded_retrained_vs_anna"]
+    assert arm.ego == (Shielded(members=(Trained(stage="retrained_anna-seed1"),), rule="rss"),)
+    assert arm.needs == without["retrained_vs_anna"].needs
 
 
 def test_plan__a_persona_with_lapses_is_also_assessed_alone_with_its_eyes_on_the_road() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from harness.campaign.plan.paper_rounds import questions
-from harness.campaign.plan.stages import description
+from harness.campaign.plan.planned_drivers import description
 from harness.campaign.preflight import open_campaign
 from harness.errors import UsageError
 from tests.support.plans import campaign_of, planned, stages_of

@@ -9,7 +9,7 @@ from scipy import stats
 
 from harness.evaluation.columns import TABLES
 from harness.evaluation.competence import AloneBound
-from harness.evaluation.game_theory.best_response_gap import Response, gaps, nothing_to_gain
+from harness.evaluation.game_theory.best_response_gap import OWN, Response, gaps, nothing_to_gain
 from harness.evaluation.gap_verdict import GapVerdict
 from tests.support.game_tables import arm, table
 
@@ -75,7 +75,8 @@ def test_gap__is_a_share_of_the_payoffs_size_also_where_the_payoff_is_negative_o
     ("better_by", "verdict"),
     [
         ([3.0, 2.9, 3.1, 3.0, 3.05, 2.95], GapVerdict.DISTINGUISHABLE),
-        ([3.0, -2.9, 3.1, -3.0, 3.05, -2.95], GapVerdict.NOT_DISTINGUISHABLE),
+        ([3.0, 2.0, -1.0, -0.5, 1.0, 0.5], GapVerdict.NOT_DISTINGUISHABLE),
+        ([3.0, -2.9, 3.1, -3.0, 3.05, -2.95], GapVerdict.NONE_FOUND),
         ([-3.0, -2.9, -3.1, -3.0, -3.05, -2.95], GapVerdict.LACKS_POWER),
         ([1.0, -1.0, 2.0, -2.0, 3.0, -3.0], GapVerdict.NONE_FOUND),
         ([0.0] * 6, GapVerdict.NO_DIFFERENCE),
@@ -154,6 +155,16 @@ def test_best_known__each_half_of_the_games_takes_what_is_best_in_the_other_half
     assert (row["payoff_best_response"], row["gap"], row["search_gap"]) == (9.5, -0.5, 1)
 
 
+def test_best_known__a_player_keeps_its_own_strategy_where_nothing_earned_more():
+    # the search earns 1 less in the mean of the even games and 2 less in that of the odd ones, the robust ego the same
+    # as the player: of equal ones its own strategy comes first
+    pair, search = earning("pair", 10, 12, 8, 10), earning("best_ego", 11, 9, 5, 9, failed=[1, 1])
+    row = one(KNOWN, pair, search, earning("robust_vs_speedy", 8, 10, 10, 12))
+    assert (row["best_known"], row["gap"], row["payoff_best_response"]) == ("its own strategy", 0, row["payoff"])
+    assert (row["search_gap"], row["verdict"]) == (-1.5, GapVerdict.NONE_FOUND.value)
+    assert row["ego_failure_rate_best_response"] == row["ego_failure_rate"] == 0
+
+
 def test_best_known__of_equal_ones_it_is_the_search():
     pair, search = earning("pair", 1, 2, 3, 4), earning("best_ego", 3, 2, 4, 5)
     row = one(KNOWN, pair, search, earning("robust_vs_speedy", 4, 5, 3, 2))
@@ -199,7 +210,7 @@ def test_lacks_power__of_a_search_below_its_own_strategy_unless_a_gain_is_known(
         earning("best_ego", *(payoffs - np.array([3.0, 2.9, 3.1, 3.0, 3.05, 2.95]))),
     )
     below = one(KNOWN, pair, search, earning("robust_vs_speedy", *payoffs))  # exactly as good as the player
-    assert (below["verdict"], below["best_known"], below["gap"]) == (GapVerdict.LACKS_POWER.value, "robust", 0)
+    assert (below["verdict"], below["best_known"], below["gap"]) == (GapVerdict.LACKS_POWER.value, OWN, 0)
     assert below["search_gap"] == pytest.approx(-3)
     better = earning("robust_vs_speedy", *(payoffs + np.array([1.0, 1.1, 0.9, 1.05, 0.95, 1.0])))
     assert one(KNOWN, pair, search, better)["verdict"] == GapVerdict.DISTINGUISHABLE.value
@@ -252,6 +263,6 @@ def test_gap__of_a_pair_that_cannot_drive_is_no_answer(gain):
     assert row["reason"] == (
         "the retrained ego can't drive this scene: alone it reaches its goal in 38 of 40 games (95 %), below 97 %"
     )
-    assert row["gap"] == pytest.approx(gain)
+    assert row["gap"] == pytest.approx(max(gain, 0.0))
     assert all(math.isnan(row[name]) for name in ("ci_low", "ci_high", "p_value", "p_holm"))
     assert not nothing_to_gain(gaps([replace(EGO, alone=ALONE), NON_EGO], table(pair, best, alone), 0.01))

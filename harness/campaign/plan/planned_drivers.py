@@ -1,0 +1,139 @@
+"""The drivers of a plan: who plays on each side of its stages.
+
+The two sides of a game are the ego and the non-egos. A persona drives in every place of the non-egos, a population is a
+mixture of personas in every place, and a crowd has a persona for each place: all are a `Side` of planned drivers, a
+closed union of which `execution.player_factory` makes drivers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import chain
+from typing import Literal, TypeAlias
+
+from harness.evaluation.strategies import Borrowed
+
+
+@dataclass(frozen=True, kw_only=True)
+class SumoDriven:
+    """SUMO's own models."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class External:
+    """The campaign's external ego, or another driver of its cross-play by name."""
+
+    name: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reconfigured:
+    """The external ego with the parameters that a search of this plan found."""
+
+    stage: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trained:
+    """The policy that a training of this plan makes."""
+
+    stage: str
+    persona: str = ""
+    """The persona with which it drives; empty: the ego's own."""
+    borrowed: Borrowed | None = None
+    """The trait with which it drives that is not the persona's own."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainedBefore:
+    """The policy that a training of this name made in another run, read from the campaign's folder of policies."""
+
+    stage: str
+    persona: str = ""
+    """The persona with which it drives; empty: the ego's own."""
+    borrowed: Borrowed | None = None
+    """The trait with which it drives that is not the persona's own."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FixedMixture:
+    """One of several drivers in each game, drawn by fixed shares."""
+
+    members: tuple[PlannedMember, ...]
+    shares: tuple[float, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class EquilibriumMixture:
+    """One of several drivers in each game, drawn by the shares of an equilibrium."""
+
+    members: tuple[PlannedMember, ...]
+    arms: tuple[tuple[str, ...], ...]
+    """The assessments whose mean payoffs make the game: a row per ego, a column per non-ego."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BestOf:
+    """Of several drivers the one with the highest mean payoff in games played for this choice alone."""
+
+    members: tuple[PlannedMember, ...]
+    persona: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shielded:
+    """A driver with a shield around it."""
+
+    members: tuple[PlannedMember]
+    rule: Literal["rss"]
+
+
+PlannedMember = SumoDriven | External | Reconfigured | Trained | TrainedBefore
+"""One driver, the same in every game."""
+PlannedDriver = PlannedMember | FixedMixture | EquilibriumMixture | BestOf | Shielded
+Side: TypeAlias = tuple[PlannedDriver, ...]
+"""The drivers of a side: those of the non-egos' places in their order, from the first again where there are more places
+than drivers. Empty: the side takes no part."""
+
+
+def driver_in(side: Side, place: int) -> PlannedDriver | None:
+    """The driver of a side in one of its places; None: no one."""
+    return side[place % len(side)] if side else None
+
+
+def members_of(*drivers: PlannedDriver) -> tuple[PlannedMember, ...]:
+    """The drivers that may play: the members of mixtures, choices and shields, or the drivers themselves."""
+    several = FixedMixture | EquilibriumMixture | BestOf | Shielded
+    members = (driver.members if isinstance(driver, several) else (driver,) for driver in drivers)
+    return tuple(chain.from_iterable(members))
+
+
+def persona_of(driver: PlannedDriver) -> str:
+    """The name of the persona with which a driver drives; empty: the ego's own."""
+    match driver:
+        case Trained(persona=persona) | TrainedBefore(persona=persona) | BestOf(persona=persona):
+            return persona
+        case _:
+            return ""
+
+
+def borrowed_of(driver: PlannedDriver) -> Borrowed | None:
+    """The trait with which a driver drives that is not its persona's own."""
+    return driver.borrowed if isinstance(driver, Trained | TrainedBefore) else None
+
+
+def description(driver: PlannedDriver) -> str:
+    """The driver as the card of a policy names its opponent."""
+    match driver:
+        case SumoDriven():
+            return "sumo"
+        case External(name=name):
+            return name or "given"
+        case Reconfigured(stage=stage) | Trained(stage=stage) | TrainedBefore(stage=stage):
+            return stage
+        case BestOf():
+            return "best"
+        case Shielded(members=(member,)):
+            return description(member)
+        case FixedMixture(members=members) | EquilibriumMixture(members=members):
+            return "one in each game of " + ", ".join(description(each) for each in members)
