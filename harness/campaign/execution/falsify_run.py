@@ -13,7 +13,8 @@ from harness.assessment.continuation import Continuation
 from harness.assessment.falsification import FIRST_EPISODE, Searcher, falsify
 from harness.assessment.rollout import Game, SeatedArm
 from harness.campaign.execution.run_players import RunPlayers
-from harness.campaign.plan.stages import AssessmentStage, SumoDriven
+from harness.campaign.plan.planned_drivers import SumoDriven
+from harness.campaign.plan.stages import AssessmentStage
 from harness.drivers.reference_drivers import REFERENCES
 from harness.errors import UsageError
 from harness.evaluation.comparisons.games_to_failure import (
