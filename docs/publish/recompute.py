@@ -209,7 +209,7 @@ def crossplay(table: pd.DataFrame, games: Games) -> Iterator[Cell]:
 
 
 def gaps(table: pd.DataFrame, games: Games, cells: pd.DataFrame) -> Iterator[Cell]:
-    """`cells` is crossplay.csv, which says in which arm two strategies meet."""
+    """`cells` is crossplay.csv, which says in which arm two strategies meet. A player may keep its own strategy."""
     p_values = []
     for row in table.to_dict("records"):
         p_values.append(row["p_value"])
@@ -220,11 +220,11 @@ def gaps(table: pd.DataFrame, games: Games, cells: pd.DataFrame) -> Iterator[Cel
         met = of_seed[(of_seed[other] == row[other]) & (of_seed["persona"].isin([row["persona"]]))]
         pair_arm = met.loc[met[role] == row[role], "arm"].item()
         own = games.of(pair_arm, seed)[column]
-        answers = [games.of(f"{pair_arm}_{role}_response", seed)[column]]
+        answers = [own, games.of(f"{pair_arm}_{role}_response", seed)[column]]
         answers += [games.of(arm, seed)[column] for arm in met.loc[met[role] != row[role], "arm"]]
         both = pd.concat([own, *(each for each in answers if len(each))], axis=1).dropna().astype(float)
         yield f"{where}, pairs", row["pairs"], len(both)
-        yield f"{where}, known", row["known"], both.shape[1] - 2
+        yield f"{where}, known", row["known"], both.shape[1] - 3
         if not len(both):
             continue
         pair, responses = both.iloc[:, 0], both.iloc[:, 1:].set_axis(range(both.shape[1] - 1), axis=1)
@@ -232,7 +232,7 @@ def gaps(table: pd.DataFrame, games: Games, cells: pd.DataFrame) -> Iterator[Cel
         best = responses[responses[~even].mean().idxmax()].where(even, responses[responses[even].mean().idxmax()])
         yield f"{where}, payoff", row["payoff"], pair.mean()
         yield f"{where}, gap", row["gap"], (best - pair).mean()
-        yield f"{where}, search_gap", row["search_gap"], (responses[0] - pair).mean()
+        yield f"{where}, search_gap", row["search_gap"], (responses[1] - pair).mean()
         if not math.isnan(row["p_value"]):
             t = (best - pair).mean() / ((best - pair).std() / math.sqrt(len(both)))
             low, high = t_interval(best - pair)
