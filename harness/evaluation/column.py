@@ -28,6 +28,8 @@ class Column:
     """Where the definition comes from; empty: our own."""
     label: str = ""
     """Its heading on pages; by default its name in words."""
+    optional: bool = False
+    """Whether a table in which every cell of it would be empty is without the column."""
 
     def __post_init__(self) -> None:
         if not self.unit:

@@ -85,12 +85,18 @@ METRICS: list[Metric] = []
 
 
 def metric(
-    *whose: str, meaning: str, dtype: str = NUMBER, source: str = "", mean: str = "", unit: str = ""
+    *whose: str,
+    meaning: str,
+    dtype: str = NUMBER,
+    source: str = "",
+    mean: str = "",
+    unit: str = "",
+    optional: bool = False,
 ) -> Callable[[Callable[[Any], Value]], Callable[[Any], Value]]:
     """Enter a function of a `Drive` into `METRICS`: its name is that of the column."""
 
     def enter(function: Callable[[Any], Value]) -> Callable[[Any], Value]:
-        column = Column(function.__name__, dtype, meaning, source=source, unit=unit)
+        column = Column(function.__name__, dtype, meaning, source=source, unit=unit, optional=optional)
         METRICS.append(Metric(column=column, whose=whose, mean=mean, of=function))
         return function
 
@@ -208,9 +214,10 @@ def payoff(drive: Drive) -> float:
 @metric(
     "ego",
     meaning="Interventions of the shield per km driven: each a run of steps in which it changes the decision; empty "
-    "without a shield.",
+    "in arms without a shield, and no column in runs without one.",
     mean="shield_interventions_per_km",
     unit="1/km",
+    optional=True,
 )
 def shield_interventions_per_km(drive: Drive) -> float | None:
     flags, driven_m = drive.shielded, float(drive.of("speed_mps").sum()) * drive.step_s
@@ -222,9 +229,11 @@ def shield_interventions_per_km(drive: Drive) -> float | None:
 
 @metric(
     "ego",
-    meaning="Share of the steps in which the shield changes the decision; empty without a shield.",
+    meaning="Share of the steps in which the shield changes the decision; empty in arms without a shield, and no "
+    "column in runs without one.",
     mean="shielded_share",
     unit=SHARE,
+    optional=True,
 )
 def shielded_share(drive: Drive) -> float | None:
     return float(drive.shielded.mean()) if drive.shielded is not None and len(drive.shielded) else None

@@ -28,7 +28,10 @@ _TRUTH = {"true": True, "false": False}
 def table_of(name: str, rows: Iterable[Mapping[str, Any]] = (), people: int = 1) -> pd.DataFrame:
     """Rows as a table of this name in `TABLES`; a missing cell is empty, another one is dropped. `people`: of
     a game."""
-    return typed(pd.DataFrame(list(rows), columns=list(columns_for(people, TABLES[name]))))
+    rows, columns = list(rows), columns_for(people, TABLES[name])
+    measured = {each for each in columns if columns[each].optional and any(pd.notna(row.get(each)) for row in rows)}
+    there = [each for each, column in columns.items() if not column.optional or each in measured]
+    return typed(pd.DataFrame(rows, columns=there))
 
 
 def joined(name: str, frames: Iterable[pd.DataFrame]) -> pd.DataFrame:
@@ -48,14 +51,16 @@ def typed(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def columns_of(names: Iterable[str]) -> Mapping[str, Column]:
-    """The columns of the table that has these. Raises ValueError where there is none."""
+    """The columns of the table that has these; optional ones may be missing. Raises ValueError where there is none."""
     names = list(names)
     people = len(people_in(names))
     for columns in (columns_for(people, TABLES["episodes"]), columns_for(people, TABLES["played"]), *TABLES.values()):
-        if sorted(names) == sorted(columns):
-            return columns
+        there = {name: column for name, column in columns.items() if not column.optional or name in names}
+        if sorted(names) == sorted(there):
+            return there
     nearest, columns = max(TABLES.items(), key=lambda table: len(set(names) & set(table[1])))
-    missing, unknown = sorted(set(columns) - set(names)), sorted(set(names) - set(columns))
+    missing = sorted(name for name, column in columns.items() if name not in names and not column.optional)
+    unknown = sorted(set(names) - set(columns))
     raise ValueError(f"not a table of a run; nearest is {nearest}: missing {missing}, unknown {unknown}")
 
 

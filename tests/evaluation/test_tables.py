@@ -11,7 +11,7 @@ from scipy import stats
 from harness.errors import UsageError
 from harness.evaluation.columns import TABLES
 from harness.evaluation.comparisons.summary import summarise
-from harness.evaluation.tables import read_csv, table_of, typed, write_csv
+from harness.evaluation.tables import joined, read_csv, table_of, typed, write_csv
 
 WHOLE = st.integers(-(2**62), 2**62)
 CELLS = {
@@ -118,8 +118,19 @@ def test_write_csv__writes_exactly_these_bytes(tmp_path):
     shown |= {"ego_mean_speed_mps": "0.30000000000000004", "duration_s": "12.0"}
     error = {"arm": "naive_alone", "seed": "1", "episode": "1", "ego_outcome": "error", "ego_payoff": "-1e-17"}
     error |= {"error": '"no ""lane"",\nat all"'}
-    lines = [",".join(row.get(name, "") for name in TABLES["episodes"]) for row in (shown, error)]
-    assert path.read_bytes().decode() == "\n".join([",".join(TABLES["episodes"]), *lines, ""])
+    names = [name for name, column in TABLES["episodes"].items() if not column.optional]
+    lines = [",".join(row.get(name, "") for name in names) for row in (shown, error)]
+    assert path.read_bytes().decode() == "\n".join([",".join(names), *lines, ""])
+
+
+def test_table__has_an_optional_column_only_where_a_cell_of_it_is_known(tmp_path):
+    without, shielded = episodes_of(game()), episodes_of(game("shielded_naive_alone", ego_shielded_share=0.25))
+    assert "ego_shielded_share" not in without
+    both = joined("episodes", [without, shielded])
+    assert both["ego_shielded_share"].isna().tolist() == [True, False]
+    assert "ego_shield_interventions_per_km" not in both
+    write_csv(both, tmp_path / "episodes.csv")
+    assert read_csv(tmp_path / "episodes.csv").equals(both)
 
 
 def test_write_csv__truth_values_are_true_and_false(tmp_path):

@@ -53,7 +53,11 @@ def _summary_row(arm: str, persona: str, seed: int, games: pd.DataFrame) -> dict
         **{name: (with_ego["ego_outcome"] == end).sum() if len(with_ego) else None for end, name in ends.items()},
         "mean_speed_low_mps": speed_low,
         "mean_speed_high_mps": speed_high,
-        **{metric.mean: played[f"ego_{name}"].mean() for name, metric in MEANS.items() if "ego" in metric.whose},
+        **{
+            metric.mean: played[f"ego_{name}"].mean()
+            for name, metric in MEANS.items()
+            if "ego" in metric.whose and f"ego_{name}" in played
+        },
         **goal_rate,
         **{
             f"non_ego_{name}": pd.Series(of_people(played, name).to_numpy(dtype=np.float64).ravel()).mean()
