@@ -12,11 +12,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import repeat
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from harness.assessment.game_traces import GameTraces
@@ -28,7 +26,6 @@ from harness.environments.seats import seats_of
 from harness.errors import is_of_disk
 from harness.evaluation.measured_game import measured
 from harness.evaluation.recorded_game import RecordedGame
-from harness.game.arrays import FloatArray
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.outcome import Outcome
 from harness.game.roles import EGO
@@ -173,7 +170,7 @@ class _Rollout:
             self._on_start(episode)
         try:
             seats = [seats_of(each, paid=True) for each in self._apart]
-            with closing(Arena(self._arm.scene, min(len(starts), SIDE_BY_SIDE), seats, recorded=True)) as arena:
+            with closing(Arena(self._arm.scene, _tiles(len(starts)), seats, recorded=True)) as arena:
                 return self._play(arena, starts)
         except Exception as error:
             if isinstance(error, MemoryError) or is_of_disk(error):
@@ -227,6 +224,11 @@ class _Rollout:
         self._alone = None
 
 
+def _tiles(games: int) -> int:
+    """The tiles for games side by side: a power of two, so that a scene's net is copied for few numbers of tiles."""
+    return min(1 << (games.bit_length() - 1), SIDE_BY_SIDE)
+
+
 def plays_side_by_side(arm: SeatedArm) -> bool:
     """Whether games of an arm may be played side by side."""
     return _drivers_apart(arm) is not None
@@ -246,56 +248,3 @@ def _played(arm: SeatedArm, episode: int, outcomes: Sequence[Outcome], error: st
     named = zip(arm.scene.world.roles, outcomes, arm.present_in(episode), strict=True)
     words = {f"{role}_outcome": outcome.word if there else "" for role, outcome, there in named}
     return {"episode": episode, **words, "error": error}
-
-
-def start_at(
-    scene: OpenScene, drawn: InitialState, position_m: Sequence[float], speed_mps: Sequence[float]
-) -> InitialState:
-    """A drawn start with other positions (of the front bumpers, along the players' lines) and speeds [P]."""
-    lengths_m = scene.world.length_m
-    poses = [
-        place.pose(position, length)
-        for place, position, length in zip(scene.places, position_m, lengths_m.tolist(), strict=True)
-    ]
-    x_m, y_m, heading_rad = np.array(poses).T
-    positions = np.array(position_m, dtype=float)
-    return replace(
-        drawn,
-        x_m=x_m,
-        y_m=y_m,
-        heading_rad=heading_rad,
-        speed_mps=np.array(speed_mps, dtype=float),
-        position_m=positions,
-        station_m=positions - 0.5 * lengths_m,
-    )
-
-
-class StartTrials:
-    """Plays one episode of an arm as often as asked, each time from another start. SUMO runs in the `with` block."""
-
-    def __init__(self, arm: SeatedArm, episode: int) -> None:
-        self._arm = arm
-        self._next: FloatArray | None = None
-        self.last_start: FloatArray = np.empty(0)
-        """[2 P] the start of the game that was played last."""
-        self._games: Iterator[Game] = assess(arm, repeat(episode), start_from=self._start)
-
-    def play(self, start: FloatArray | None) -> Game:
-        """Play the episode from a start [2 P]: the players' positions, then their speeds; None: from the one that is
-        drawn for it. Raises SimulationError if SUMO can't load the scene."""
-        self._next = start
-        return next(self._games)
-
-    def __enter__(self) -> StartTrials:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self._games.close()  # type: ignore[attr-defined]
-
-    def _start(self, drawn: InitialState) -> InitialState:
-        start = drawn
-        if self._next is not None:
-            position_m, speed_mps = np.split(self._next, 2)
-            start = start_at(self._arm.scene, drawn, position_m.tolist(), speed_mps.tolist())
-        self.last_start = np.concatenate((start.position_m, start.speed_mps))
-        return start

@@ -21,6 +21,7 @@ from harness.evaluation.column import (
     Column,
     rate,
 )
+from harness.evaluation.league_columns import LEAGUE_MEASURES, LEAGUE_PAIRING
 from harness.evaluation.measured_game import METRICS_OF_CONDUCT, METRICS_OF_GAMES, METRICS_OF_PLAYERS
 from harness.evaluation.over_trainings_columns import OVER_TRAININGS
 from harness.evaluation.preventability_columns import PREVENTABILITY, REFERENCE_DRIVERS
@@ -324,6 +325,7 @@ _TABLES = {
     ),
     "reference_drivers": (*_GAME, _outcome("ego", "ego"), *REFERENCE_DRIVERS),
     "preventability": (ARM, PERSONA, SEED, *PREVENTABILITY),
+    "league": (*LEAGUE_PAIRING, SEED, ARM, _EPISODES, *LEAGUE_MEASURES),
 }
 TABLES: Mapping[str, Mapping[str, Column]] = {
     table: {column.name: column for column in columns} for table, columns in _TABLES.items()
