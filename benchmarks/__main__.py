@@ -1,7 +1,8 @@
 """`python -m benchmarks`: measure, print and store. `python -m benchmarks table`: the stored results in Markdown.
 
 `python -m benchmarks step` and `training`: where the time of a step and of a training goes. `python -m benchmarks
-reads`: the cost of reading vehicles. `python -m benchmarks scale`: what a large study would take.
+reads`: the cost of reading vehicles. `python -m benchmarks assessment`: games alone and side by side. `python -m
+benchmarks scale`: what a large study would take.
 """
 
 from __future__ import annotations
@@ -136,6 +137,14 @@ def training(
     from benchmarks.training_parts import training_table
 
     print(training_table(seconds))
+
+
+@app.command()
+def assessment() -> None:
+    """Print how many games an assessment plays per second of processor time, alone and side by side, in Markdown."""
+    from benchmarks.assessment import assessment_table
+
+    print(assessment_table())
 
 
 @app.command()

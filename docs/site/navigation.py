@@ -15,6 +15,7 @@ SECTIONS = {
         "installation",
         "campaigns",
         "commands",
+        "league",
         "egos",
         "egos-by-rules",
         "egos-by-networks",

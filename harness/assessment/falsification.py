@@ -19,7 +19,8 @@ from typing import Any
 import cmaes
 import numpy as np
 
-from harness.assessment.rollout import Game, SeatedArm, assess, start_at
+from harness.assessment.rollout import Game, SeatedArm, assess
+from harness.assessment.start_trials import start_at
 from harness.errors import StageFailed
 from harness.game.arrays import FloatArray
 from harness.game.initial_state import InitialState

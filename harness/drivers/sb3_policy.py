@@ -152,7 +152,7 @@ class SavedPolicy(NamedTuple):
 def read_sb3_policy(document: StableBaselines3, file: Path, normalize: Path | None) -> SavedPolicy:
     """The policy in a file. Raises UsageError if it can't be read, if another algorithm saved it, if its spaces are not
     those of a driver, and if it learned under `VecNormalize` and `normalize` is not given."""
-    saved, named = _saved_by(file), document.algorithm
+    saved, named = saved_by(file), document.algorithm
     if saved not in (None, named) and {saved, named} not in _ALIKE:
         known = StableBaselines3.model_fields["algorithm"].annotation.__args__  # type: ignore[union-attr]
         remedy = f'algorithm = "{saved}"' if saved in known else f"policies of {saved} are not supported"
@@ -170,7 +170,7 @@ def read_sb3_policy(document: StableBaselines3, file: Path, normalize: Path | No
     return SavedPolicy(model.policy, scaling, gives_index)
 
 
-def _saved_by(file: Path) -> str | None:
+def saved_by(file: Path) -> str | None:
     """The algorithm that saved a file, by its `data`; None if this is not known. Nothing is unpickled."""
     try:
         with zipfile.ZipFile(file) as archive:

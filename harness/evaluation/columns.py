@@ -22,6 +22,7 @@ from harness.evaluation.column import (
     rate,
 )
 from harness.evaluation.falsification_columns import FALSIFICATION, SEARCHES
+from harness.evaluation.league_columns import LEAGUE_MEASURES, LEAGUE_PAIRING
 from harness.evaluation.measured_game import METRICS_OF_CONDUCT, METRICS_OF_GAMES, METRICS_OF_PLAYERS
 from harness.evaluation.over_trainings_columns import OVER_TRAININGS
 from harness.evaluation.preventability_columns import PREVENTABILITY, REFERENCE_DRIVERS
@@ -337,6 +338,7 @@ _TABLES = {
     "falsification": (*FALSIFICATION, _P_LOG_RANK, _P_HOLM, _VERDICT),
     "reference_drivers": (*_GAME, _outcome("ego", "ego"), *REFERENCE_DRIVERS),
     "preventability": (ARM, PERSONA, SEED, *PREVENTABILITY),
+    "league": (*LEAGUE_PAIRING, SEED, ARM, _EPISODES, *LEAGUE_MEASURES),
 }
 TABLES: Mapping[str, Mapping[str, Column]] = {
     table: {column.name: column for column in columns} for table, columns in _TABLES.items()

@@ -157,12 +157,20 @@ def _share(rows: Sequence[Row]) -> float:
 
 
 def _tone(rows: Sequence[Row]) -> str:
-    if not sum(map(failures, rows)):
-        return "none"
     known = [row for row in rows if np.isfinite(row["mais3_risk_high"])]
-    if not known:
+    risk = np.nan
+    if known:
+        risk = np.average([row["mais3_risk_high"] for row in known], weights=[row["collisions"] for row in known])
+    return tone_of(sum(map(failures, rows)), float(risk))
+
+
+def tone_of(failed: int, risk: float) -> str:
+    """A key of `TONES`, for a number of failures and the mean risk of a serious injury in their collisions (NaN: not
+    known)."""
+    if not failed:
+        return "none"
+    if not np.isfinite(risk):
         return "unknown"
-    risk = np.average([row["mais3_risk_high"] for row in known], weights=[row["collisions"] for row in known])
     return "small" if risk <= 0.01 else "medium" if risk <= 0.1 else "severe"
 
 

@@ -9,7 +9,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from harness.assessment.rollout import SeatedArm, assess_batches, plays_side_by_side
+from harness.drivers.car import car_of
 from harness.drivers.policy_file import LearnedDriver
+from harness.drivers.reference_drivers import UPPER_BOUND, reference_driver
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Step
 from harness.errors import SimulationError
@@ -80,6 +83,55 @@ def test_assess__lapses_depend_on_the_episode_and_not_on_the_arm(merge: OpenScen
     for one, other in zip(*lapses, strict=True):
         both = one.index.intersection(other.index)[:20]  # before the players can influence each other
         assert one[both].equals(other[both])
+
+
+# --- games side by side -----------------------------------------------------------------------------------------------
+
+
+def side_by_side(assessed: SeatedArm, *batches: list[int]) -> list[str]:
+    """The games as text, each with all of its trace."""
+    return [repr((game.played, game.trace)) for game in assess_batches(assessed, batches)]
+
+
+@pytest.mark.parametrize(("scene", "judged"), [("paper_merge", True), ("red_light", False), ("zebra", False)])
+def test_batch__has_the_bytes_of_games_alone(scene: str, judged: bool) -> None:
+    """Nobody follows the ego on paper_merge; elsewhere half of the games have a follower, and are played alone."""
+    opened = open_scene(scene)
+    ego = reference_driver(UPPER_BOUND, car_of(opened.world, 0), 3.5) if judged else RANDOM
+    assessed = arm(opened, ego, RANDOM, persona=TEXTING)
+    alone = side_by_side(assessed, *([episode] for episode in range(5)))
+    assert side_by_side(assessed, [0, 1, 2], [4, 3]) == [*alone[:3], alone[4], alone[3]]
+
+
+def test_batch__of_more_games_than_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A tile plays one game after the other, and stands still at the end."""
+    assessed = arm(open_scene("paper_merge"), RANDOM, RANDOM)
+    alone = side_by_side(assessed, *([episode] for episode in range(7)))
+    monkeypatch.setattr("harness.assessment.rollout.SIDE_BY_SIDE", 2)
+    assert side_by_side(assessed, [*range(7)]) == alone
+
+
+def test_batch__drivers_of_others_and_sumo_play_alone(merge: OpenScene) -> None:
+    assert not plays_side_by_side(arm(merge, Steady(), RANDOM))
+    assert not plays_side_by_side(arm(merge, RANDOM, SumoDriver()))
+    assert plays_side_by_side(arm(open_scene("zebra"), RANDOM, SumoDriver()))  # an ordinary walker
+
+
+def test_batch__an_error_ends_only_its_game(merge: OpenScene, monkeypatch: pytest.MonkeyPatch) -> None:
+    """After an error among games side by side each is played again alone."""
+    assessed = arm(open_scene("paper_merge"), RANDOM, RANDOM)
+    alone, decide, starts = side_by_side(assessed, [0], [1], [2]), LearnedDriver.decide, list[int]()
+
+    def fail(driver: LearnedDriver, games: IntArray, seen: FloatArray, noise: FloatArray) -> FloatArray:
+        if starts[-1] == 1 or len(starts) == 3:
+            raise RuntimeError("out of ideas")
+        return decide(driver, games, seen, noise)
+
+    monkeypatch.setattr(LearnedDriver, "decide", fail)
+    games = list(assess_batches(assessed, [[0, 1, 2]], starts.append))
+    assert starts == [0, 1, 2, 0, 1, 2]
+    assert [game.played["error"] for game in games] == ["", "RuntimeError: out of ideas", ""]
+    assert [repr((game.played, game.trace)) for game in games[::2]] == alone[::2]
 
 
 # --- records ----------------------------------------------------------------------------------------------------------

@@ -3,9 +3,9 @@
 <work>/segments/<first>-<last>.json            checksums: the segment is complete; and the versions that played it
 <work>/segments/<first>-<last>.<table>         its log: outcomes and errors, and traces
 
-So an arm continues where it stopped, needs the memory of one segment, however many games it has, and workers that have
-nothing else to do help its own: who plays a segment has its lock. A game depends on nothing but itself: the files of an
-arm are the same bytes with and without interruptions, and do not depend on the workers that play it.
+So an arm continues where it stopped, needs the memory of a few segments, however many games it has, and workers that
+have nothing else to do help its own: who plays a segment has its lock. A game depends on nothing but itself: the files
+of an arm are the same bytes with and without interruptions, and do not depend on the workers that play it.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, suppress
+from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
-from harness.assessment.rollout import Game, SeatedArm, assess
+from harness.assessment.rollout import Game, SeatedArm, assess_batches, plays_side_by_side
 from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import SEGMENT_EPISODES, StageRun
 from harness.campaign.plan.stages import AssessmentStage, stage_id
@@ -38,6 +38,8 @@ from harness.road.scene.open_scene import OpenScene
 HOPELESS_GAMES = 10
 """An arm ends if this many games, its first, can't be played for one reason: the others would not be played either."""
 KEEP_GOING = "--keep-going"
+AT_ONCE = 10
+"""Segments that a worker takes at a time, if their games can be played side by side."""
 _TRACES = "traces.parquet"
 _HELP_S = 10.0  # the time after which a helper starts no further segment: a stage may wait for it
 _POLL_S = 0.25
@@ -111,7 +113,7 @@ def help_with_arm(stage: AssessmentStage, run: StageRun, scene: OpenScene) -> di
     if not left or folder.done(stage.id):
         return {"segments": 0}
     arm, until_s = PlayerFactory(context=run.context, scene=scene).arm(stage), time.monotonic() + _HELP_S
-    in_time = takewhile(lambda _: time.monotonic() < until_s, left)
+    in_time = takewhile(lambda _: time.monotonic() < until_s, _in_groups(left, _at_once(arm)))
     return {"segments": _play_free(arm, in_time, _labels(stage), run)}
 
 
@@ -125,12 +127,21 @@ def segments_of(folder: Path, episodes: int) -> list[Segment]:
     return [Segment(folder, range(first, min(first + SEGMENT_EPISODES, episodes))) for first in firsts]
 
 
+def _at_once(arm: SeatedArm) -> int:
+    return AT_ONCE if plays_side_by_side(arm) else 1
+
+
+def _in_groups(segments: Sequence[Segment], size: int) -> Iterator[Sequence[Segment]]:
+    return (segments[first : first + size] for first in range(0, len(segments), size))
+
+
 def play_segments(arm: SeatedArm, segments: Sequence[Segment], labels: Mapping[str, Any], run: StageRun) -> None:
     """Play the games of an arm that are missing, and wait for those that helpers play.
 
     `labels` are the cells that all records share. The run is told of each episode before that game is played here, and
-    of the games played, by any worker, and their total. Raises as `assess` does, and StageFailed if the first ten games
-    can't be played for one reason, unless the run keeps going.
+    of the games played, by any worker, and their total. After a crash each game is played alone, so that its place is
+    known. Raises as `assess_batches` does, and StageFailed if the first ten games can't be played for one reason,
+    unless the run keeps going.
     """
     make_folder(segments[0].folder)
     for segment in segments:
@@ -138,19 +149,20 @@ def play_segments(arm: SeatedArm, segments: Sequence[Segment], labels: Mapping[s
         if errors is None or (errors and run.attempt.first):
             segment.file("json").unlink(missing_ok=True)
     left, total = list(segments), segments[-1].episodes.stop
+    at_once = _at_once(arm) if run.attempt.first else 1
 
     def report(playing: int = 0) -> None:
         left[:] = [each for each in left if not each.is_played]
         run.on_progress(total - sum(len(each.episodes) for each in left) + playing, total)
 
-    def until_played(part: Sequence[Segment]) -> Iterator[Segment]:
+    def until_played(part: Sequence[Segment]) -> Iterator[Sequence[Segment]]:
         while missing := [each for each in part if not each.is_played]:
-            yield from missing
+            yield from _in_groups(missing, at_once)
             report()
             if not all(each.is_played for each in part):  # a helper plays them
                 time.sleep(_POLL_S)
 
-    def in_order() -> Iterator[Segment]:
+    def in_order() -> Iterator[Sequence[Segment]]:
         first = [each for each in segments if each.episodes[0] < HOPELESS_GAMES]
         report()
         yield from until_played(first)
@@ -171,25 +183,33 @@ def _check_hope(arm: SeatedArm, first: Sequence[Segment]) -> None:
 
 def _play_free(
     arm: SeatedArm,
-    segments: Iterable[Segment],
+    groups: Iterable[Sequence[Segment]],
     labels: Mapping[str, Any],
     run: StageRun,
     *,
     on_game: Callable[[int], None] = lambda playing: None,
 ) -> int:
-    """Play the segments that no other worker plays or has played. Returns their number.
+    """Play the segments that no other worker plays or has played, those of a group as one batch. Returns their number.
 
-    `on_game` gets the number of games played in the current one.
+    `on_game` gets the number of games played in the current segment.
     """
-    stage, played, episodes = stage_id(labels["arm"], labels["seed"]), 0, deque[int]()
-    folder, upcoming = run.context.folder, iter(episodes.popleft, None)
-    with closing(assess(arm, upcoming, run.on_start, run.attempt.abandoned)) as games:  # type: ignore[type-var]
-        for segment in segments:
-            with suppress(InUse), held_by_worker(folder.workers, f"{stage}.{segment.episodes[0]:06d}", 0.0):
-                if not segment.is_played and folder.done(stage) is None:
-                    episodes.extend(segment.episodes)
+    stage, played, batches = stage_id(labels["arm"], labels["seed"]), 0, deque[list[int]]()
+    folder, upcoming = run.context.folder, iter(batches.popleft, None)
+    with closing(assess_batches(arm, upcoming, run.on_start, run.attempt.abandoned)) as games:  # type: ignore[type-var]
+        for group in groups:
+            with ExitStack() as locks:
+                own = list[Segment]()
+                for segment in group:
+                    with suppress(InUse):
+                        place = f"{stage}.{segment.episodes[0]:06d}"
+                        locks.enter_context(held_by_worker(folder.workers, place, 0.0))
+                        if not segment.is_played and folder.done(stage) is None:
+                            own.append(segment)
+                if own:
+                    batches.append([episode for segment in own for episode in segment.episodes])
+                for segment in own:
                     segment.play(games, labels, arm, on_game)
-                    played += 1
+                played += len(own)
     return played
 
 

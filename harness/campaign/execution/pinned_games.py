@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from harness.assessment.rollout import SeatedArm, StartTrials
+from harness.assessment.start_trials import SeatedArm, StartTrials
 from harness.campaign.execution.run_players import RunPlayers, SeatedDriver
 from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.results.read_run import episodes_of

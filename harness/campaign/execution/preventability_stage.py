@@ -16,7 +16,7 @@ from typing import Any
 
 from harness.assessment.conflict_replay import Collision, ConflictReplay, collision_of
 from harness.assessment.continuation import Continuation
-from harness.assessment.rollout import assess
+from harness.assessment.rollout import assess_batches
 from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import StageRun
 from harness.campaign.plan.planned_drivers import SumoDriven
@@ -126,7 +126,9 @@ def _from_start(
             outcomes = {}
             driver = reference_driver(name, car_of(scene.world, EGO), lane_width_of(scene.world))
             drivers = (mixture_of(driver, run.context.ego_persona), *seatless.drivers[1:])
-            for game in assess(replace(seatless, drivers=drivers), episodes, run.on_start, run.attempt.abandoned):
+            batches = [episodes] if run.attempt.first else [[episode] for episode in episodes]
+            judged = replace(seatless, drivers=drivers)
+            for game in assess_batches(judged, batches, run.on_start, run.attempt.abandoned):
                 record = game.record
                 outcomes[record["episode"]] = {"outcome": outcome_of(record), "error": str(record["error"])}
                 run.on_progress(len(found) * len(episodes) + len(outcomes), len(episodes) * len(REFERENCES))

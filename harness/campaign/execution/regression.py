@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.assessment.rollout import SeatedArm, StartTrials
+from harness.assessment.start_trials import SeatedArm, StartTrials
 from harness.config.campaign import SUMO, resolve
 from harness.config.persona import Persona
 from harness.config.pinned_game import PinnedGame, PinnedPerson

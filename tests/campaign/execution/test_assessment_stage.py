@@ -1,4 +1,4 @@
-"""An arm in segments: the same bytes whatever interrupted it, and the memory of one segment."""
+"""An arm in segments: the same bytes whatever interrupted it, and the memory of a few segments."""
 
 from __future__ import annotations
 
@@ -194,7 +194,8 @@ def game(episode):
     columns = {name: [texts.get(name, 0.5)] * 2000 for name in SCHEMA.names}
     columns |= {"episode": [episode] * 2000, "step": list(range(2000)), "lapsed": [False] * 2000}
     return Game(played={"episode": episode, "ego_outcome": "goal", "error": ""}, trace=columns, scene=None)
-segments.assess = lambda arm, episodes, begin, abandoned: (game(each) for each in episodes)
+segments.assess_batches = lambda arm, batches, begin, abandoned: (game(each) for batch in batches for each in batch)
+segments.plays_side_by_side = lambda arm: True
 class Anyone:
     name, seed, scene, drivers = "a", 1, None, (None, None)
 parts = segments.segments_of(folder / "segments", episodes)
@@ -205,7 +206,7 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
 
 
-def test_arm__needs_the_memory_of_one_segment(tmp_path: Path) -> None:
+def test_arm__needs_the_memory_of_a_few_segments(tmp_path: Path) -> None:
     """Ten times the games of 2,000 rows each, which would be 160 MB more, in a process of their own."""
     peak_kb = []
     for episodes in (100, 1000):

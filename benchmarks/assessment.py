@@ -1,0 +1,41 @@
+"""Games of an assessment per second of processor time: alone, and side by side in batches."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+from benchmarks.games import REPOSITORY, coasting_policy, persona
+from harness.assessment.rollout import SeatedArm, assess_batches
+from harness.drivers.mixture import mixture_of
+from harness.drivers.policy_file import LearnedDriver
+from harness.drivers.sumo import SumoDriver
+from harness.road.scene.open_scene import open_scene
+
+_GAMES = 50
+_TURNS = 3
+_SCENES = ("paper_merge", "merge", "left_across", "zebra")
+
+
+def assessment_table() -> str:
+    """In Markdown, for some scenes: the games per second of two learned drivers and of a learned ego among SUMO's
+    drivers, traces included and metrics not. The best of several turns counts."""
+    lines = ["| scene | against | alone | side by side | ratio |", "| --- | --- | ---: | ---: | ---: |"]
+    for name in _SCENES:
+        scene = open_scene(REPOSITORY / "networks" / name)
+        people = len(scene.world.roles) - 1
+        learned = LearnedDriver(coasting_policy(), sampled=False)
+        for against, driver in (("a learned person", learned), ("SUMO", SumoDriver())):
+            players = (mixture_of(learned, persona("careful")), *[mixture_of(driver, persona("speedy"))] * people)
+            arm = SeatedArm(name="benchmark", scene=scene, drivers=players, seed=1)
+            alone, together = [[episode] for episode in range(_GAMES)], [range(_GAMES)]
+            turns = [(_games_per_s(arm, alone), _games_per_s(arm, together)) for _ in range(_TURNS)]
+            slow, fast = map(max, zip(*turns, strict=True))
+            lines.append(f"| `{name}` | {against} | {slow:.0f} | {fast:.0f} | {fast / slow:.1f}× |")
+    return "\n".join(lines)
+
+
+def _games_per_s(arm: SeatedArm, batches: Sequence[Sequence[int]]) -> float:
+    start_s = time.process_time()
+    played = sum(1 for _ in assess_batches(arm, batches))
+    return played / (time.process_time() - start_s)

@@ -1,0 +1,145 @@
+"""A league: one ego against all people on all roads. For each scene there is a campaign, in which nothing is trained.
+
+    <folder>/campaigns/<scene>.toml   the campaign of a scene
+    <folder>/egos/<name>.toml         the ego's document, without the parameters that a search may change
+    <folder>/<scene>/                 its run folder
+
+The people of a scene are the policies in `policies/<scene>/` of players other than the ego. People of other training
+seeds than the first ones have a campaign of their own, `<scene>-seed<n>`.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from harness.campaign.preflight import OpenCampaign, open_campaign
+from harness.config.campaign import LEARNED, SUMO
+from harness.config.driver import DriverDocument, Onnx, Process, StableBaselines3, TorchScript
+from harness.config.tunable import Adjustable
+from harness.drivers.external import find_driver
+from harness.drivers.policy_file import read_card
+from harness.drivers.sb3_policy import saved_by
+from harness.errors import Problem, UsageError, collect
+from harness.files import make_folder, write_atomically
+from harness.game.roles import EGO, ROLES
+from harness.shipped_documents import find_document, missing_document, shipped, shipped_names
+
+_CAMPAIGNS, _EGOS = "campaigns", "egos"
+_OPTION = "--ego"
+_SEED = "-seed"
+
+
+def open_league(
+    ego: str, scenes: Sequence[str], folder: Path, *, episodes: int, allow_code: bool = False
+) -> list[OpenCampaign]:
+    """Write the campaigns of a league into its folder, and open them. `scenes` are names or folders; none: every
+    shipped scene. Raises UsageError with every problem found."""
+    problems: list[Problem] = []
+    names = scenes or shipped_names("networks")
+    found = [collect(problems, partial(_scene_at, each)) for each in names]
+    driver = collect(problems, partial(_driver, ego, folder / _EGOS, allow_code))
+    if problems or driver is None:
+        raise UsageError(problems)
+    opened = []
+    for scene in dict.fromkeys(filter(None, found)):
+        for campaign in _campaigns(scene, driver, episodes):
+            file = folder / _CAMPAIGNS / f"{campaign['name']}.toml"
+            make_folder(file.parent)
+            write_atomically(file, tomli_w.dumps(campaign).encode())
+            opened.append(collect(problems, partial(open_campaign, file, allow_code=allow_code)))
+    if problems:
+        raise UsageError(problems)
+    return [each for each in opened if each is not None]
+
+
+def name_of(ego: str) -> str:
+    """A short name of an ego of the command line: that of its file, or of its program."""
+    return Path(ego if os.path.exists(ego) else shlex.split(ego)[0]).stem
+
+
+def people_of(scene: Path) -> dict[tuple[int, ...], list[str]]:
+    """The shipped people of a scene: the names of their personas, by their training seeds."""
+    seeds: dict[str, list[int]] = {}
+    folder = shipped("policies") / scene.name
+    if scene == shipped("networks").resolve() / scene.name and folder.is_dir():
+        for policy in sorted(folder.iterdir()):
+            name, _, seed = policy.name.rpartition(_SEED)
+            if name and seed.isdecimal() and policy.is_dir() and read_card(policy).get("player") != ROLES[EGO]:
+                seeds.setdefault(name, []).append(int(seed))
+    people: dict[tuple[int, ...], list[str]] = {}
+    for name, of_person in seeds.items():
+        people.setdefault(tuple(sorted(of_person)), []).append(name)
+    return people
+
+
+def _scene_at(written: str) -> Path:
+    place = find_document(written, Path(), "networks")
+    if not place.is_dir():
+        raise UsageError.of("--scenes", "", *missing_document(written, Path(), "networks"))
+    return place
+
+
+def _campaigns(scene: Path, driver: str, episodes: int) -> Iterator[Mapping[str, Any]]:
+    """The documents of the campaigns of a scene."""
+    shared = {"scene": str(scene), "ego": {"driver": driver}, "assessment": {"episodes": episodes}}
+    people = people_of(scene)
+    if not people:
+        yield {"name": scene.name, **shared}
+    for number, (seeds, personas) in enumerate(people.items()):
+        name = f"{scene.name}{_SEED}{'-'.join(map(str, seeds))}" if number else scene.name
+        policies = str(shipped("policies") / scene.name)
+        yield {"name": name, "personas": personas, "seeds": list(seeds), "policies": policies, **shared}
+
+
+def _driver(ego: str, folder: Path, allow_code: bool) -> str:
+    """What the campaigns call an ego of the command line. Its document, if it has one, is written into the folder."""
+    if ego == LEARNED:
+        message = f"{ego!r} is trained by a campaign, and a league trains nothing"
+        raise UsageError.of(_OPTION, "", message, "name a policy, such as paper_merge/naive-seed11")
+    if ego == SUMO:
+        return ego
+    document = _seen(ego)
+    if document is None:
+        driver = find_driver(ego, Path(_OPTION), "", allow_code)
+        if driver.document is None:
+            return str(driver.place)
+        document = driver.document_in(folder)
+    if isinstance(document, Adjustable):
+        document = document.model_copy(update={"tunable": {}})  # nothing is searched
+    file = folder / f"{name_of(ego)}.toml"
+    make_folder(folder)
+    write_atomically(file, document.toml(f"The ego of a league: {ego}").encode())
+    find_driver(str(file.resolve()), Path(_OPTION), "", allow_code)
+    return f"../{_EGOS}/{file.name}"
+
+
+def _seen(ego: str) -> DriverDocument | None:
+    """The document of an ego whose kind can be seen: a network, a policy of Stable-Baselines3, or a command."""
+    path = Path(ego).absolute()
+    match path.suffix.lower():
+        case ".onnx" if path.is_file():
+            return Onnx(kind="onnx", file=str(path))
+        case ".pt" if path.is_file():
+            return TorchScript(kind="torchscript", file=str(path))
+        case ".zip" if path.is_file():
+            algorithm = saved_by(path)
+            if algorithm is None:
+                message = f"{ego!r} does not tell which algorithm of Stable-Baselines3 saved it"
+                raise UsageError.of(_OPTION, "", message, "name a driver document with its `algorithm` (docs/egos.md)")
+            return StableBaselines3.model_validate(
+                {"kind": "stable_baselines3", "file": str(path), "algorithm": algorithm}
+            )
+    command = shlex.split(ego)
+    if not os.path.exists(path) and len(command) > 1 and shutil.which(command[0]):
+        return Process(kind="process", command=command, folder=str(Path.cwd()))
+    if path.is_file() and os.access(path, os.X_OK) and path.suffix.lower() not in (".toml", ".fmu"):
+        return Process(kind="process", command=[str(path)], folder=str(Path.cwd()))
+    return None

@@ -1,0 +1,67 @@
+"""The command `harness league`: one ego against all people on all roads."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from harness.cli.output import AllowCode, AsJson, Quiet, Verbose, output, print_json, print_plain
+
+
+def league(
+    ego: Annotated[
+        str,
+        typer.Option(
+            metavar="EGO",
+            help="The ego: what `[ego] driver` of a campaign takes (a driver document, the folder or the name of a "
+            "policy, an installed driver, `sumo`), a file .onnx, .pt or .zip (Stable-Baselines3), or a command in "
+            "quotes.",
+        ),
+    ],
+    scenes: Annotated[
+        str | None,
+        typer.Option(
+            metavar="A,B", help="Names or folders of scenes, joined by commas.  [default: every shipped scene]"
+        ),
+    ] = None,
+    episodes: Annotated[int, typer.Option(min=2, metavar="N", help="Games of each pairing.")] = 100,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="The folder of the league.  [default: reports/league-EGO]")
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="Number of processes.  [default: one per core]")
+    ] = None,
+    allow_code: AllowCode = False,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Play one ego against all people in all scenes. Nothing is trained and no file has to be written.
+
+    The people are the shipped policies of each scene; SUMO's driver and the empty road are played in every scene. Run
+    the command again to continue an interrupted league. The folder contains league.html, league.csv, result.json and
+    junit.xml, and a run folder for each scene.
+    """
+    with output(as_json, quiet, verbose) as console:
+        with console.status("reading scenes and people"):
+            from harness.campaign.execution.run_league import play_league
+            from harness.campaign.execution.worker_pool import WorkerPool, cores
+            from harness.campaign.league_campaigns import name_of, open_league
+            from harness.reports.league_page import league_terminal
+
+            folder = out or Path("reports") / f"league-{name_of(ego)}"
+            names = [each.strip() for each in scenes.split(",")] if scenes is not None else []
+            campaigns = open_league(ego, names, folder, episodes=episodes, allow_code=allow_code)
+        outcome = play_league(name_of(ego), campaigns, folder, partial(WorkerPool, jobs=jobs or cores()), console)
+        console.print(league_terminal(outcome.table))
+        print_plain([f"League: {folder / 'league.html'}"], console)
+        if as_json:
+            print_json({"league": str(folder), **outcome.record})
+        if outcome.failed:
+            console.quiet = False
+            print_plain(outcome.failed, console, "red")
+        if outcome.exit_code:
+            raise typer.Exit(outcome.exit_code)

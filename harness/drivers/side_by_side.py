@@ -1,0 +1,58 @@
+"""Drivers in games that are played side by side: each decides the same, to the last bit, as in a game alone.
+
+The sum of a matrix product depends on the number of its rows in the last bits. A network therefore decides one game
+after the other. Rules are the same numbers in any number of games. Drivers of others (programs, FMUs, packages) are
+asked about one game, as their authors tried them out: they play no games side by side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from harness.drivers.mixture import Mixture
+from harness.drivers.network_driver import NetworkDriver
+from harness.drivers.ordinary_walker import OrdinaryWalker
+from harness.drivers.policy_file import LearnedDriver
+from harness.drivers.protocol import Driver
+from harness.drivers.reference_drivers import StrongestBraking
+from harness.drivers.rules_driver import RulesDriver
+from harness.game.arrays import BoolArray, FloatArray, IntArray
+
+_BY_RULES = (RulesDriver, StrongestBraking, OrdinaryWalker)
+_NETWORKS = (LearnedDriver, NetworkDriver)  # they keep no state
+
+
+def side_by_side(players: Sequence[Mixture | None], walks: BoolArray) -> tuple[Mixture | None, ...] | None:
+    """[P] the players' drivers for games side by side; None if one of them can't play such games. `walks` [P] are on
+    foot: there an ordinary walker drives for SUMO."""
+    found = list[Mixture | None]()
+    for player, on_foot in zip(players, walks.tolist(), strict=True):
+        members = player.members if player is not None else ()
+        drivers = [each.driver for each in members]
+        if not all(isinstance(each, (*_BY_RULES, *_NETWORKS)) or (on_foot and not each.takes_over) for each in drivers):
+            return None
+        apart = [_OneByOne(each) if isinstance(each, _NETWORKS) else each for each in drivers]
+        changed = tuple(replace(member, driver=driver) for member, driver in zip(members, apart, strict=True))
+        found.append(Mixture(changed) if changed else None)
+    return tuple(found)
+
+
+class _OneByOne:
+    """Lets a driver decide one game after the other."""
+
+    takes_over = True
+
+    def __init__(self, driver: Driver) -> None:
+        self._driver = driver
+
+    def reset(self, games: IntArray) -> None:
+        """Reset games [N]."""
+        self._driver.reset(games)
+
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        """Actions [N, 2] from observations [N, SIZE] and noise [N, 2]."""
+        rows = (slice(k, k + 1) for k in range(len(games)))
+        return np.concatenate([self._driver.decide(games[row], observation[row], noise[row]) for row in rows])

@@ -1,0 +1,33 @@
+"""The columns of the table `league`, but for those that many tables share."""
+
+from __future__ import annotations
+
+from harness.evaluation.column import COUNT, MAYBE, NUMBER, TEXT, Column, rate
+
+NOBODY, SUMO_DRIVER = "nobody", "sumo"
+"""The column `person` of arms without a persona."""
+LEAGUE_PAIRING = (
+    Column("ego", TEXT, "The ego of the league."),
+    Column("scene", TEXT, "The scene."),
+    Column("person", TEXT, "`nobody`, `sumo` (SUMO's driver in the person's seat), or the persona."),
+)
+_ENDS = ("collision", "rail", "timeout")
+LEAGUE_MEASURES = (
+    Column("errors", COUNT, "Games that could not be played."),
+    *rate("failure_rate", "Share of the games in which the ego failed."),
+    *(Column(f"{each}s", MAYBE, f"Games in which the ego's outcome is {each}.") for each in _ENDS),
+    *rate(
+        "preventable_rate",
+        "Share of the games that the ego fails, and the careful and competent driver of UN R157 does not, from "
+        "the start in its place; judged against personas.",
+    ),
+    Column(
+        "serious_injuries",
+        NUMBER,
+        "Expected number of games with a serious injury (MAIS3+), per game, at most: the sum of mais3_risk_high where "
+        "it is known, over the games that were played.",
+    ),
+    *rate("harm_to_others_rate", "Share of the games with harm_to_others: a person or a bystander fails."),
+    Column("mean_speed_mps", NUMBER, "Mean over the games of the ego's average speed."),
+    *rate("hard_brake_rate", "Share of the games in which the ego brakes hard (`hard_brake` in docs/manoeuvres.md)."),
+)

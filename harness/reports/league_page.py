@@ -1,0 +1,106 @@
+"""The page of a league: the failures of one ego in all scenes, against all people, worst first."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+
+from harness.evaluation.league_columns import NOBODY, SUMO_DRIVER
+from harness.reports.failure_table import ORDINARY, TONES, FailureCell, tone_of
+from harness.reports.numbers import NO_SPACE, interval, number, percent
+from harness.reports.page_template import environment_of
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+HEADINGS = (
+    *("scene", "person", "failures", "95 %", "preventable", "MAIS3+ per 100 games"),
+    *("harm to others", "mean speed", "hard braking"),
+)
+_MUCH = 0.1
+"""A failure rate above this is red on the terminal."""
+
+
+def render_league(ego: str, table: pd.DataFrame, addresses: Sequence[str], failed: Sequence[str]) -> str:
+    """The page as HTML. `table` is the table `league`, `addresses` lead to the worst game of each of its rows, `failed`
+    says what could not be played."""
+    rows = table.to_dict("records")
+    scenes = list(dict.fromkeys(row["scene"] for row in rows))
+    people = sorted({row["person"] for row in rows} - {NOBODY, SUMO_DRIVER})
+    columns = [each for each in (NOBODY, SUMO_DRIVER, *people) if each in {row["person"] for row in rows}]
+    cells: dict[tuple[str, str], list[FailureCell]] = {}
+    for row, address in zip(rows, addresses, strict=True):
+        cells.setdefault((row["scene"], row["person"]), []).append(_cell(row, address))
+    return (
+        environment_of("reports")
+        .get_template("league.html.jinja")
+        .render(
+            ego=ego,
+            games=int(table["episodes"].sum() - table["errors"].sum()),
+            columns=[person_in_words(each) for each in columns],
+            lines=[(scene, [cells.get((scene, person), []) for person in columns]) for scene in scenes],
+            headings=HEADINGS,
+            tones=TONES,
+            rows=[(address, list(_texts(row))) for row, address in zip(rows, addresses, strict=True)],
+            failed=failed,
+        )
+    )
+
+
+def league_terminal(table: pd.DataFrame, most: int = 12) -> Table:
+    """The worst rows for the terminal."""
+    from rich.table import Table
+
+    shown = Table(box=None, pad_edge=False)
+    for heading in HEADINGS[:5]:
+        shown.add_column(heading, overflow="fold")
+    for row in table.head(most).to_dict("records"):
+        shown.add_row(*list(_texts(row))[:5], style="red" if row["failure_rate"] > _MUCH else None)
+    return shown
+
+
+def sentence_of(row: Mapping[Any, Any]) -> str:
+    """What a row of the table says, in a sentence."""
+    low, high = row["failure_rate_low"], row["failure_rate_high"]
+    who = f"against {person_in_words(row['person'])} in {row['scene']}"
+    return f"The ego fails in {_counts(row)} games {who}: {percent(row['failure_rate'])} (95 %: {interval(low, high)})."
+
+
+def person_in_words(person: str) -> str:
+    """A cell of the column `person` for people."""
+    return ORDINARY if person == SUMO_DRIVER else person
+
+
+def _cell(row: Mapping[Any, Any], address: str) -> FailureCell:
+    collisions, played = row["collisions"], row["episodes"] - row["errors"]
+    injured = row["serious_injuries"] * played
+    return FailureCell(
+        rate=percent(row["failure_rate"]),
+        counts=_counts(row),
+        spans=(),
+        tone=tone_of(_failures(row), injured / collisions if injured > 0.0 and collisions > 0 else math.nan),
+        game=address,
+    )
+
+
+def _failures(row: Mapping[Any, Any]) -> int:
+    return int(sum(row[each] for each in ("collisions", "rails", "timeouts") if row[each] == row[each]))
+
+
+def _counts(row: Mapping[Any, Any]) -> str:
+    return f"{_failures(row)} of {row['episodes'] - row['errors']}"
+
+
+def _texts(row: Mapping[Any, Any]) -> Iterator[str]:
+    yield row["scene"]
+    yield person_in_words(row["person"])
+    yield f"{percent(row['failure_rate'])} ({_counts(row)})"
+    yield interval(row["failure_rate_low"], row["failure_rate_high"])
+    yield percent(row["preventable_rate"])
+    yield number(100.0 * row["serious_injuries"], 1)
+    yield percent(row["harm_to_others_rate"])
+    yield f"{number(row['mean_speed_mps'], 1)}{NO_SPACE}m/s"
+    yield percent(row["hard_brake_rate"])

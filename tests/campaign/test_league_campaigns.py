@@ -1,0 +1,60 @@
+"""The campaigns of a league: egos whose kind can be seen, discovered people, and mistakes of the command line."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+
+from harness.campaign import league_campaigns
+from harness.campaign.league_campaigns import name_of, open_league, people_of
+from harness.errors import UsageError
+from harness.shipped_documents import shipped
+
+
+def drivers(ego: str, folder: Path, allow_code: bool = False) -> list[str]:
+    """The kinds of the egos of a league on one scene, and their parameters to search."""
+    (campaign,) = open_league(ego, ["zebra"], folder, episodes=2, allow_code=allow_code)
+    driver = campaign.ego_driver
+    return [] if driver is None else [driver.kind, *(each.key for each in driver.searched)]
+
+
+def test_ego__of_each_kind_that_can_be_seen(tmp_path: Path) -> None:
+    assert drivers("sumo", tmp_path / "a") == []
+    assert drivers("adas", tmp_path / "b") == ["rules"]  # its tunable parameters are not searched
+    assert drivers(str(shipped("egos") / "rss.toml"), tmp_path / "c") == ["rules"]
+    assert drivers(str(shipped("policies") / "paper_merge" / "naive-seed11"), tmp_path / "d") == ["policy"]
+    script = tmp_path / "my drive.py"
+    shutil.copy(Path(__file__).parents[2] / "egos/examples/process/drive.pl", script)
+    command = f"{sys.executable} '{script}'"
+    with pytest.raises(UsageError, match="--allow-code"):
+        drivers(command, tmp_path / "e")
+    assert name_of(command) == Path(sys.executable).stem
+
+
+def test_people__are_discovered_by_their_seeds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A new person of other seeds has a campaign of its own; egos in the folder are no people."""
+    assert people_of(shipped("networks").resolve() / "paper_merge") == {(11,): ["paper_distracted", "paper_speedy"]}
+    assert people_of(tmp_path / "paper_merge") == {}
+    policies = tmp_path / "policies" / "paper_merge"
+    shutil.copytree(shipped("policies") / "paper_merge", policies)
+    (policies / "paper_speedy-seed11").rename(policies / "paper_speedy-seed12")
+    real = shipped
+    monkeypatch.setattr(league_campaigns, "shipped", lambda kind: policies.parent if kind == "policies" else real(kind))
+    scene = real("networks").resolve() / "paper_merge"
+    assert people_of(scene) == {(11,): ["paper_distracted"], (12,): ["paper_speedy"]}
+    names = [each["name"] for each in league_campaigns._campaigns(scene, "sumo", 2)]
+    assert names == ["paper_merge", "paper_merge-seed12"]
+
+
+def test_mistakes__are_all_told_before_anything_is_played(tmp_path: Path) -> None:
+    with pytest.raises(UsageError) as caught:
+        open_league("adsa", ["mergge", "zebra"], tmp_path, episodes=2)
+    assert [str(each)[:60] for each in caught.value.problems] == [
+        "--ego: there is no driver 'adsa' (did you mean 'adas'?; or n",
+        "--scenes: there is no scene 'mergge' (did you mean 'merge'? ",
+    ]
+    with pytest.raises(UsageError, match="a league trains nothing"):
+        open_league("learned", ["zebra"], tmp_path, episodes=2)

@@ -1,0 +1,97 @@
+"""A tiny league through the command: an ONNX network that always brakes, in two scenes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import onnx
+import pandas as pd
+import pytest
+from onnx import TensorProto, helper
+from typer.testing import CliRunner
+
+from harness.cli.app import app
+from harness.evaluation.tables import read_csv
+from harness.game.observation_layout import SIZE
+
+EPISODES = 3
+ALL_OF_THREE = 0.025 ** (1 / 3)
+"""The low end of the Clopper-Pearson interval of 3 of 3."""
+
+
+@pytest.fixture(scope="module")
+def league(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the league."""
+    folder = tmp_path_factory.mktemp("league")
+    _write_brake(folder / "brake.onnx")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        options = ("--scenes", "paper_merge,zebra", "--episodes", str(EPISODES), "--jobs", "1", "--out", "out")
+        done = CliRunner().invoke(app, ["league", "--ego", "brake.onnx", *options])
+    assert done.exit_code == 0, done.output
+    assert "zebra: campaign 2 of 2, about" in done.output
+    return folder / "out"
+
+
+def _write_brake(file: Path) -> None:
+    """A network that decides full braking, straight on, whatever it observes."""
+    weights = onnx.numpy_helper.from_array(np.zeros((SIZE, 2), dtype=np.float32), "weights")
+    bias = onnx.numpy_helper.from_array(np.array([-1.0, 0.0], dtype=np.float32), "bias")
+    nodes = [helper.make_node("Gemm", ["seen", "weights", "bias"], ["action"])]
+    seen, action = (
+        helper.make_tensor_value_info(name, TensorProto.FLOAT, ["n", size])
+        for name, size in (("seen", SIZE), ("action", 2))
+    )
+    graph = helper.make_graph(nodes, "brake", [seen], [action], [weights, bias])
+    onnx.save(helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8), file)
+
+
+def rows(league: Path) -> pd.DataFrame:
+    return read_csv(league / "league.csv").set_index(["scene", "person"])
+
+
+def test_rows__every_shipped_person_and_ordinary_traffic_in_every_scene(league: Path) -> None:
+    people = ("nobody", "sumo", "paper_distracted", "paper_speedy")
+    pairings = {("paper_merge", person) for person in people} | {("zebra", "nobody"), ("zebra", "sumo")}
+    assert set(rows(league).index) == pairings
+    assert set(rows(league)["ego"]) == {"brake"}
+    assert set(rows(league)["episodes"]) == {EPISODES}
+
+
+def test_rows__an_ego_that_stands_runs_out_of_time(league: Path) -> None:
+    """Alone it brakes to a stand in every game, which hurts nobody, and has no person to prevent anything against."""
+    for scene in ("paper_merge", "zebra"):
+        row = rows(league).loc[scene, "nobody"]
+        assert row[["failure_rate", "failure_rate_high", "hard_brake_rate"]].tolist() == [1.0, 1.0, 1.0]
+        assert row["failure_rate_low"] == pytest.approx(ALL_OF_THREE)
+        assert row[["collisions", "rails", "timeouts", "errors"]].tolist() == [0, 0, EPISODES, 0]
+        assert row["serious_injuries"] == 0.0
+        assert np.isnan(row["preventable_rate"])
+
+
+def test_rows__are_those_of_the_run_folders(league: Path) -> None:
+    """How many failures the driver of UN R157 prevents from the start is counted again, game by game."""
+    judged = read_csv(league / "paper_merge" / "reference_drivers.csv")
+    regulation = judged[judged["driver"] == "careful_and_competent"]
+    summary = read_csv(league / "paper_merge" / "summary.csv").set_index("arm")
+    for person in ("paper_speedy", "paper_distracted"):
+        row, arm = rows(league).loc["paper_merge", person], f"naive_vs_{person}"
+        prevented = regulation[regulation["arm"] == arm]["prevented_from_start"].sum()
+        assert row["preventable_rate"] == pytest.approx(prevented / EPISODES)
+        assert row["mean_speed_mps"] == summary.loc[arm, "mean_speed_mps"]
+
+
+def test_page__cells_open_games_of_the_reports(league: Path) -> None:
+    page = (league / "league.html").read_text(encoding="utf-8")
+    assert page.count('href="zebra/report.html#game=naive_alone,1,') == 2  # in the matrix and in the list
+    assert "3 of 3" in page
+
+
+def test_files_for_ci__have_each_pairing(league: Path) -> None:
+    result = json.loads((league / "result.json").read_text(encoding="utf-8"))
+    assert (result["exit_code"], result["failed"], len(result["rows"])) == (0, [], 6)
+    junit = (league / "junit.xml").read_text(encoding="utf-8")
+    assert 'tests="6"' in junit
+    assert "The ego fails in 3 of 3 games against nobody in zebra: 100" in junit
