@@ -6,7 +6,8 @@ import time
 from collections.abc import Sequence
 
 from benchmarks.games import REPOSITORY, coasting_policy, persona
-from harness.assessment.rollout import SeatedArm, assess_batches
+from harness.assessment.rollout import assess_batches
+from harness.assessment.seated_arm import SeatedArm
 from harness.drivers.mixture import mixture_of
 from harness.drivers.policy_file import LearnedDriver
 from harness.drivers.sumo import SumoDriver

@@ -19,7 +19,8 @@ from typing import Any
 import cmaes
 import numpy as np
 
-from harness.assessment.rollout import Game, SeatedArm, assess
+from harness.assessment.rollout import Game, assess
+from harness.assessment.seated_arm import SeatedArm
 from harness.assessment.start_trials import start_at
 from harness.errors import StageFailed
 from harness.game.arrays import FloatArray

@@ -17,11 +17,10 @@ from types import MappingProxyType
 from typing import Any
 
 import pandas as pd
-import pyarrow as pa
 
 from harness.assessment.game_traces import GameTraces
+from harness.assessment.seated_arm import SeatedArm
 from harness.drivers.mixture import Mixture, factors_of, shares_of
-from harness.drivers.shield import ShieldedDriver
 from harness.drivers.side_by_side import side_by_side
 from harness.environments.arena import Arena
 from harness.environments.recorded import recorded_game
@@ -29,7 +28,6 @@ from harness.environments.seats import seats_of
 from harness.errors import is_of_disk
 from harness.evaluation.measured_game import measured
 from harness.evaluation.recorded_game import RecordedGame
-from harness.evaluation.trace_file import SCHEMA, SHIELDED_SCHEMA
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.outcome import Outcome
 from harness.game.roles import EGO
@@ -39,34 +37,6 @@ from harness.road.scene.open_scene import OpenScene
 
 SIDE_BY_SIDE = 32
 """The most games at once in one simulation."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class SeatedArm:
-    """A pairing to assess. Each player has one of the drivers of its mixture per game; None: it does not take part.
-
-    Several people without an ego drive one at a time: in episode k, person k modulo their number (`present_in`).
-    """
-
-    name: str
-    scene: OpenScene
-    drivers: tuple[Mixture | None, ...]
-    """[P], ego first."""
-    seed: int
-    """The seed of the starts, `Campaign.start_seed`: not that of the trainings of the drivers."""
-
-    @property
-    def trace_schema(self) -> pa.Schema:
-        """The columns of the traces of its games."""
-        return SHIELDED_SCHEMA if any(map(_shield_of, self.drivers)) else SCHEMA
-
-    def present_in(self, episode: int) -> list[bool]:
-        """[P] which players take part in an episode."""
-        present = [driver is not None for driver in self.drivers]
-        if present[EGO] or sum(present) < 2:
-            return present
-        people = [player for player, there in enumerate(present) if there]
-        return [player == people[episode % len(people)] for player in range(len(present))]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,7 +118,7 @@ class _Rollout:
         factors, shares = [factors_of(each) for each in arm.drivers], [shares_of(each) for each in arm.drivers]
         self._starts = arm.scene.start_distribution(factors, [1.0] * len(factors), shares)
         self._steers = [driver is not None and driver.takes_over for driver in arm.drivers]
-        self._shields = [_shield_of(driver) for driver in arm.drivers]
+        self._shields = arm.shields
         self._apart = _drivers_apart(arm)
         self._alone: Arena | None = None
 
@@ -262,9 +232,3 @@ def _played(arm: SeatedArm, episode: int, outcomes: Sequence[Outcome], error: st
     named = zip(arm.scene.world.roles, outcomes, arm.present_in(episode), strict=True)
     words = {f"{role}_outcome": outcome.word if there else "" for role, outcome, there in named}
     return {"episode": episode, **words, "error": error}
-
-
-def _shield_of(player: Mixture | None) -> ShieldedDriver | None:
-    """The shield of a player, which then has one driver; None without one."""
-    driver = player.members[0].driver if player is not None else None
-    return driver if isinstance(driver, ShieldedDriver) else None

@@ -9,7 +9,7 @@ from itertools import repeat
 import numpy as np
 
 from harness.assessment.rollout import Game, assess
-from harness.assessment.rollout import SeatedArm as SeatedArm
+from harness.assessment.seated_arm import SeatedArm
 from harness.game.arrays import FloatArray
 from harness.game.initial_state import InitialState
 from harness.road.scene.open_scene import OpenScene

@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from harness.assessment.rollout import SeatedArm, assess_batches, plays_side_by_side
+from harness.assessment.rollout import assess_batches, plays_side_by_side
+from harness.assessment.seated_arm import SeatedArm
 from harness.drivers.car import car_of
 from harness.drivers.policy_file import LearnedDriver
 from harness.drivers.reference_drivers import UPPER_BOUND, reference_driver

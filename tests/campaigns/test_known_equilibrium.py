@@ -29,7 +29,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from harness.assessment.rollout import SeatedArm, assess
+from harness.assessment.rollout import assess
+from harness.assessment.seated_arm import SeatedArm
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.car import car_of

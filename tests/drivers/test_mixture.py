@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from harness.assessment.rollout import SeatedArm, assess
+from harness.assessment.rollout import assess
+from harness.assessment.seated_arm import SeatedArm
 from harness.campaign.results.population_rows import by_who_drove
 from harness.config.campaign import Campaign, Population
 from harness.config.persona import Persona

@@ -12,7 +12,8 @@ import pandas as pd
 import pytest
 
 from harness import DrivingEnv, ParallelDrivingEnv, UsageError
-from harness.assessment.rollout import Game, SeatedArm
+from harness.assessment.rollout import Game
+from harness.assessment.seated_arm import SeatedArm
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.sumo import SumoDriver

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from harness.assessment.rollout import Game, SeatedArm, assess
+from harness.assessment.rollout import Game, assess
+from harness.assessment.seated_arm import SeatedArm
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.mixture import Mixture, mixture_of

@@ -19,7 +19,8 @@ from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
-from harness.assessment.rollout import Game, SeatedArm, assess_batches, plays_side_by_side
+from harness.assessment.rollout import Game, assess_batches, plays_side_by_side
+from harness.assessment.seated_arm import SeatedArm
 from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import SEGMENT_EPISODES, StageRun
 from harness.campaign.plan.stages import AssessmentStage, stage_id

@@ -11,7 +11,8 @@ import pandas as pd
 from harness.assessment.conflict_replay import Collision, ConflictReplay, collision_of
 from harness.assessment.continuation import Continuation
 from harness.assessment.falsification import FIRST_EPISODE, Searcher, falsify
-from harness.assessment.rollout import Game, SeatedArm
+from harness.assessment.rollout import Game
+from harness.assessment.seated_arm import SeatedArm
 from harness.campaign.execution.run_players import RunPlayers
 from harness.campaign.plan.planned_drivers import SumoDriven
 from harness.campaign.plan.stages import AssessmentStage

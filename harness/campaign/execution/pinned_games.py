@@ -18,7 +18,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from harness.assessment.start_trials import SeatedArm, StartTrials
+from harness.assessment.seated_arm import SeatedArm
+from harness.assessment.start_trials import StartTrials
 from harness.campaign.execution.run_players import RunPlayers, SeatedDriver
 from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.results.read_run import episodes_of

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.assessment.start_trials import SeatedArm, StartTrials
+from harness.assessment.seated_arm import SeatedArm
+from harness.assessment.start_trials import StartTrials
 from harness.config.campaign import SUMO, resolve
 from harness.config.persona import Persona
 from harness.config.pinned_game import PinnedGame, PinnedPerson

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from harness.assessment.rollout import SeatedArm
+from harness.assessment.seated_arm import SeatedArm
 from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import RunContext
 from harness.campaign.plan.planned_drivers import (

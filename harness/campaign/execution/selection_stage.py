@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from harness.assessment.rollout import SeatedArm, assess
+from harness.assessment.rollout import assess
+from harness.assessment.seated_arm import SeatedArm
 from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import StageRun
 from harness.campaign.plan.planned_drivers import Side

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 import harness.campaign.execution.assessment_stage
-from harness.assessment.rollout import SeatedArm
+from harness.assessment.seated_arm import SeatedArm
 from harness.campaign.execution.assessment_stage import Segment, join_segments, play_segments, segments_of
 from harness.campaign.execution.stage_run import Attempt, StageRun
 from harness.campaign.storage.arm_tables import PLAYED
@@ -184,6 +184,7 @@ import resource, sys
 from itertools import repeat
 from pathlib import Path
 from harness.campaign.execution import assessment_stage as segments
+from harness.assessment.seated_arm import SeatedArm
 from harness.assessment.rollout import Game
 from harness.campaign.execution.stage_run import StageRun
 from tests.support.plans import empty_context

@@ -1,0 +1,47 @@
+"""A pairing of drivers on a scene, to be assessed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pyarrow as pa
+
+from harness.drivers.mixture import Mixture
+from harness.drivers.shield import ShieldedDriver
+from harness.evaluation.trace_file import SCHEMA, SHIELDED_SCHEMA
+from harness.game.roles import EGO
+from harness.road.scene.open_scene import OpenScene
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeatedArm:
+    """A pairing to assess. Each player has one of the drivers of its mixture per game; None: it does not take part.
+
+    Several people without an ego drive one at a time: in episode k, person k modulo their number (`present_in`).
+    """
+
+    name: str
+    scene: OpenScene
+    drivers: tuple[Mixture | None, ...]
+    """[P], ego first."""
+    seed: int
+    """The seed of the starts, `Campaign.start_seed`: not that of the trainings of the drivers."""
+
+    @property
+    def trace_schema(self) -> pa.Schema:
+        """The columns of the traces of its games."""
+        return SHIELDED_SCHEMA if any(self.shields) else SCHEMA
+
+    @property
+    def shields(self) -> list[ShieldedDriver | None]:
+        """[P] the shield of each player, which then has one driver; None without one."""
+        drivers = [None if player is None else player.members[0].driver for player in self.drivers]
+        return [each if isinstance(each, ShieldedDriver) else None for each in drivers]
+
+    def present_in(self, episode: int) -> list[bool]:
+        """[P] which players take part in an episode."""
+        present = [driver is not None for driver in self.drivers]
+        if present[EGO] or sum(present) < 2:
+            return present
+        people = [player for player, there in enumerate(present) if there]
+        return [player == people[episode % len(people)] for player in range(len(present))]
