@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from harness.campaign.execution.player_factory import equilibrium_of
+from harness.campaign.execution.mixture_weights import equilibrium_of
 from harness.campaign.plan.planned_drivers import EquilibriumMixture, Trained
 from harness.campaign.storage.run_folder import RunFolder
 from tests.support.repository import REPOSITORY

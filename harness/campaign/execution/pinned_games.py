@@ -18,7 +18,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from harness.assessment.seated_arm import SeatedArm
 from harness.assessment.start_trials import StartTrials
 from harness.campaign.execution.run_players import RunPlayers, SeatedDriver
 from harness.campaign.plan.stages import AssessmentStage
@@ -26,7 +25,6 @@ from harness.campaign.results.read_run import episodes_of
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.persona import Persona
 from harness.config.pinned_game import FORMAT, PinnedGame, PinnedPerson, PinnedStart
-from harness.drivers.mixture import mixture_of
 from harness.drivers.policy_file import policy_files
 from harness.errors import UsageError
 from harness.evaluation.minimising import minimise
@@ -103,9 +101,7 @@ class PinnedGames:
         """Minimise a failure and write it. Raises UsageError if the game can't be repeated, SimulationError."""
         stage, scene = self._players.arm(failure.arm, failure.seed), self._players.scene
         ego, people = self._players.ego(stage), self._players.people(stage, failure.episode)
-        drivers = tuple(mixture_of(each.driver, each.persona) for each in (ego, *people))
-        arm = SeatedArm(name=failure.arm, scene=scene, drivers=drivers, seed=self._players.start_seed)
-        with StartTrials(arm, failure.episode) as trials:
+        with StartTrials(self._players.seated(stage), failure.episode) as trials:
             game = trials.play(None)
             if not game.record.get("ego_failed"):
                 message = "played again, the ego does not fail: the run was made by another version or machine"

@@ -1,4 +1,4 @@
-"""Makes the drivers that a plan names: reads policies, weighs mixtures, chooses the best of several."""
+"""Makes the drivers that a plan names: reads policies, chooses the best of several."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from harness.assessment.rollout import assess
 from harness.assessment.seated_arm import SeatedArm
+from harness.campaign.execution.mixture_weights import equilibrium_of
 from harness.campaign.execution.stage_run import RunContext
 from harness.campaign.plan.planned_drivers import (
     BestOf,
@@ -25,13 +26,10 @@ from harness.campaign.plan.planned_drivers import (
     Trained,
     TrainedBefore,
     borrowed_of,
-    description,
     driver_in,
     persona_of,
 )
 from harness.campaign.plan.stages import AssessmentStage
-from harness.campaign.storage.arm_tables import arm_tables
-from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.trained_policies import DRIVER
 from harness.config.driver import read_driver
 from harness.config.persona import Persona
@@ -44,7 +42,6 @@ from harness.drivers.protocol import Driver
 from harness.drivers.shield import ShieldedDriver
 from harness.drivers.sumo import SumoDriver
 from harness.errors import StageFailed
-from harness.evaluation.game_theory.nash import NoEquilibrium, equilibrium_shares
 from harness.game.roles import EGO
 from harness.road.scene.open_scene import OpenScene
 
@@ -155,26 +152,3 @@ class PlayerFactory:
                 return self.context.policy_drivers[stage].make(car, sampled)
             case Trained() | TrainedBefore():
                 return LearnedDriver(read_policy(self.policy_folder(planned)), sampled)
-
-
-def equilibrium_of(mixture: EquilibriumMixture, folder: RunFolder) -> tuple[float, ...]:
-    """The shares of a mixture's members in the equilibrium of its arms.
-
-    Raises StageFailed where there is none, or where no game of an arm could be played.
-    """
-    cells = [[_mean_payoffs(folder, arm) for arm in row] for row in mixture.arms]
-    payoffs = np.array(cells, dtype=np.float64)  # [E, N, P]
-    try:
-        ego_shares, non_ego_shares = equilibrium_shares(payoffs[..., 0], payoffs[..., 1])
-    except NoEquilibrium as error:
-        raise StageFailed(f"the mixture of {description(mixture)} can't be weighed: {error}") from error
-    are_egos = not any(persona_of(each) for each in mixture.members)
-    return tuple(float(share) for share in (ego_shares if are_egos else non_ego_shares))
-
-
-def _mean_payoffs(folder: RunFolder, arm: str) -> tuple[float, float]:
-    episodes = arm_tables(folder, arm).episodes
-    played = episodes[episodes["error"] == ""]
-    if played.empty:
-        raise StageFailed(f"{arm}: none of its games could be played, so that it can't weigh a mixture")
-    return float(played["ego_payoff"].mean()), float(played["non_ego_payoff"].mean())
