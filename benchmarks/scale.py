@@ -14,7 +14,7 @@ from typing import Any
 
 from benchmarks.campaign import TimedStage, makespan_s
 from harness.campaign.plan.plan import plan
-from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage
+from harness.campaign.plan.stages import AssessmentStage, SelectionStage, Stage, TrainingStage
 from harness.config.campaign import Campaign
 from harness.evaluation.strategies import NaiveEgo
 from harness.game.roles import EGO
@@ -28,6 +28,7 @@ _KINDS = {
     "ego": "retraining of the ego",
     "alone": "arm of a player alone",
     "pair": "arm of two players",
+    "selection": "selection among policies",
 }
 _HOUR_S = 3600.0
 
@@ -91,13 +92,15 @@ def study_of(results: Mapping[str, Any]) -> Study:
     """The study, with the times of results. Raises KeyError where they have no campaign."""
     measured = results["details"]["campaign"]
     paper = _plan(["paper_speedy", "paper_distracted"], seeds=1, rounds=2)
-    seconds = {kind: mean(measured["seconds"][stage.id] for stage in paper if _kind(stage) == kind) for kind in _KINDS}
+    kinds = {_kind(stage) for stage in paper}
+    seconds = {kind: mean(measured["seconds"][stage.id] for stage in paper if _kind(stage) == kind) for kind in kinds}
     arms = sum(isinstance(stage, AssessmentStage) for stage in paper)
     planned = _plan(PERSONAS, SEEDS, ROUNDS)
     per_arm_s = 60.0 * measured["report_minutes"] / arms
     return Study(
         stages=[
-            TimedStage(id=each.id, seed=each.seed, needs=each.needs, seconds=seconds[_kind(each)]) for each in planned
+            TimedStage(id=each.id, seed=each.seed, needs=each.needs, seconds=_seconds(each, seconds))
+            for each in planned
         ],
         kinds={stage.id: _kind(stage) for stage in planned},
         report_s=per_arm_s * sum(isinstance(stage, AssessmentStage) for stage in planned),
@@ -116,7 +119,16 @@ def _plan(personas: Sequence[str], seeds: int, rounds: int) -> list[Stage]:
     return plan(Campaign.model_validate(document), list(personas))
 
 
+def _seconds(stage: Stage, of_kinds: Mapping[str, float]) -> float:
+    """A selection plays the games of an arm with each of its candidates."""
+    if isinstance(stage, SelectionStage):
+        return len(stage.candidates) * of_kinds["pair"]
+    return of_kinds[_kind(stage)]
+
+
 def _kind(stage: Stage) -> str:
+    if isinstance(stage, SelectionStage):
+        return "selection"
     if isinstance(stage, TrainingStage):
         return "naive" if stage.strategy == NaiveEgo() else "ego" if stage.learner == EGO else "non_ego"
     assert isinstance(stage, AssessmentStage)
@@ -143,7 +155,7 @@ def _stage_table(study: Study) -> str:
     for kind, name in _KINDS.items():
         times = [stage.seconds for stage in study.stages if study.kinds[stage.id] == kind]
         hours = SCENES * sum(times) / _HOUR_S
-        lines.append(f"| {name} | {SCENES * len(times):,} | {times[0]:.1f} | {hours:.1f} |")
+        lines.append(f"| {name} | {SCENES * len(times):,} | {mean(times):.1f} | {hours:.1f} |")
     lines.append(f"| report | {SCENES} | {study.report_s:.0f} | {SCENES * study.report_s / _HOUR_S:.1f} |")
     lines.append(f"| all | {SCENES * (len(study.stages) + 1):,} | | {study.work_s / _HOUR_S:.1f} |")
     return "\n".join(lines)

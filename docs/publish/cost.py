@@ -8,7 +8,7 @@ from pathlib import Path
 
 from benchmarks.campaign import TimedStage, makespan_s
 from harness.campaign.execution.worker_pool import cores
-from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage
+from harness.campaign.plan.stages import AssessmentStage, SelectionStage, Stage, TrainingStage
 from harness.campaign.plan.strategy_stages import training_settings
 from harness.campaign.preflight import OpenCampaign, open_campaign
 
@@ -18,8 +18,8 @@ _HOUR_S = 3600.0
 def cost_table(campaigns: Sequence[Path], root: Path) -> str:
     """A row per campaign: trainings, steps, arms, core-hours, hours on this machine's cores; and their sum.
 
-    Trainings count with their whole budget, although they may stop earlier, and stages that a run folder has already
-    count as well.
+    Trainings count with their whole budget, although they may stop earlier, arms of rejected answers although the
+    answers may be taken, and stages that a run folder has already count as well.
     """
     results = json.loads((root / "benchmarks" / "results.json").read_text(encoding="utf-8"))
     steps_per_s, arm_s = _rates(results)
@@ -59,6 +59,8 @@ def _seconds(campaign: OpenCampaign, stage: Stage, steps_per_s: float, episode_s
             return training_settings(campaign.document, stage).steps / steps_per_s
         case AssessmentStage():
             return campaign.document.assessment.episodes * episode_s
+        case SelectionStage(candidates=candidates):
+            return len(candidates) * campaign.document.assessment.episodes * episode_s
         case _:  # a search: trials of so many games each
             search = campaign.document.reconfiguration
             return search.trials * search.games * episode_s

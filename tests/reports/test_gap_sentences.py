@@ -70,8 +70,8 @@ FAILS = "A speedy driver newly trained against this ego makes it fail in 12 of 1
             "The search for the ego lacks power: 600,000 steps from 2 starts end 2 % below its own strategy; "
             "the search for the speedy driver lacks power: 600,000 steps from 2 starts end 2 % below its own strategy: "
             f"{MEANINGS[OPEN]}.",
-            f"{FAILS} of 3, but this driver does not earn more by it.",
-            "harm",  # the ego fails more, whatever for
+            "Nothing is known by which a speedy driver earns more against this ego than it does.",
+            "open",  # the ego fails more against what the search found, which a selfish driver does not play
         ),
         (
             (-0.0005, -0.0005),
@@ -79,7 +79,8 @@ FAILS = "A speedy driver newly trained against this ego makes it fail in 12 of 1
             "not refuted",
             "600,000 steps from 2 starts found nothing better for the ego; "
             f"600,000 steps from 2 starts found nothing better for the speedy driver: {MEANINGS[NEAR]}.",
-            "A speedy driver newly trained against this ego makes it fail in 0 of 100 games (0 %; 95 %: 0–3.6 %) "
+            # in one half of the games the search earned more, so that it is taken in the other half
+            "A speedy driver newly trained against this ego makes it fail in 2 of 100 games (2 %; 95 %: 0.2–7 %) "
             "instead of 3, but this driver does not earn more by it.",
             "open",
         ),

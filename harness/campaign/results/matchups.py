@@ -20,6 +20,7 @@ from harness.evaluation.strategies import (
     ReconfiguredEgo,
     RetrainedEgo,
     RobustEgo,
+    RoundAnswer,
     SumoNonEgo,
     round_of,
     strategy_name,
@@ -121,6 +122,7 @@ def _known_arms(response: AssessmentStage, stages: Sequence[AssessmentStage]) ->
 
 def _same_payoff(one: EgoStrategy | NonEgoStrategy, other: EgoStrategy | NonEgoStrategy) -> bool:
     """Whether two strategies of a player have one payoff: those of egos, or of one person in several rounds."""
+    one, other = (each.of if isinstance(each, RoundAnswer) else each for each in (one, other))
     match one, other:
         case PersonaNonEgo(round=round_), PersonaNonEgo():
             return one == replace(other, round=round_)

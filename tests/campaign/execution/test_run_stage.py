@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from harness.campaign.execution.run_stage import equilibrium_before
+from harness.campaign.execution.run_stage import closed_gate_before
 from harness.campaign.plan.stages import EquilibriumGate, TrainingStage
 from harness.campaign.storage.run_folder import RunFolder
 from harness.evaluation.competence import AloneBound
@@ -45,4 +45,4 @@ def test_equilibrium__of_a_pair_that_cannot_drive_is_none(
 
     monkeypatch.setattr("harness.campaign.storage.arm_tables.arm_tables", tables)
     campaign = campaign_of("anna", best_response={})
-    assert equilibrium_before(ROUND_3, RunFolder(tmp_path), campaign) == (GATE if ends else None)
+    assert closed_gate_before(ROUND_3, RunFolder(tmp_path), campaign) == (GATE if ends else None)

@@ -23,8 +23,8 @@ def test_matchups__of_all_egos_against_all_people() -> None:
     found = matchups(*BOTH, rounds={"count": 4}, **changes)
     assert found is not None
     egos = {"naive", "robust", "sumo", "adas"}
-    egos |= {f"retrained_{who}{round_}" for who in BOTH for round_ in ("", "_round4")}
-    non_egos = {f"{who}{round_}" for who in BOTH for round_ in ("", "_round3")}
+    egos |= {f"retrained_{who}{round_}" for who in BOTH for round_ in ("", "_round4", "_round4_rejected")}
+    non_egos = {f"{who}{round_}" for who in BOTH for round_ in ("", "_round3", "_round3_rejected")}
     assert {(each.ego, each.non_ego) for each in found.pairings} == {(ego, other) for ego in egos for other in non_egos}
     assert found.training_personas["robust"] == ["anna"]
     assert found.training_personas["retrained_bert_round4"] == ["bert"]
@@ -79,9 +79,12 @@ def test_matchups__a_response_knows_the_strategies_that_met_the_same_other_playe
         "naive_vs_anna_round3_ego_response": "naive_vs_anna_round3_ego_response",
     }
     # neither bert's nor SUMO's driver has anna's payoff
-    assert non_ego.known_arms == {"anna": "retrained_vs_anna"}
+    assert non_ego.known_arms == {
+        "anna": "retrained_vs_anna",
+        "anna_round3_rejected": "retrained_anna_vs_anna_round3_rejected",
+    }
     (_, non_ego) = (each for each in found.responses if each.pair_arm == "naive_vs_anna_round3")
-    assert non_ego.known_arms == {"anna": "naive_vs_anna"}
+    assert non_ego.known_arms == {"anna": "naive_vs_anna", "anna_round3_rejected": "naive_vs_anna_round3_rejected"}
 
 
 def test_matchups__a_response_does_not_know_the_strategies_of_another_seed() -> None:
