@@ -10,10 +10,13 @@ from xml.etree import ElementTree
 import pandas as pd
 import pytest
 
+from harness.campaign.results.drawn_starts import drawn_starts
 from harness.config.pinned_game import PinnedGame
 from harness.config.toml_reading import read_document
 from harness.errors import NOT_ACCEPTED
 from harness.evaluation.tables import read_csv
+from harness.evaluation.trace_file import TraceReader
+from harness.road.scene.open_scene import open_scene
 from tests.support import shipped
 from tests.support.shipped import NAIVE, PERSON, POLICIES, RETRAINED, stage
 from tests.support.tiny import SHIPPED, carried_out, finished, harness, numbers, write_campaign
@@ -117,6 +120,30 @@ def test_minimise__says_what_is_wrong(run: Path, failed: list[int]) -> None:
         done = harness("minimise", *arguments)
         assert done.returncode == 2
         assert words in done.stderr
+
+
+# --- the report's picture of the starts ---
+
+
+def test_report__draws_each_start_as_it_was_played_and_the_boundary_that_was_found(
+    run: Path, pinned: Path, tmp_path: Path
+) -> None:
+    again = shutil.copytree(run, tmp_path / "run")
+    shutil.copytree(pinned, again / "pinned")
+    done = harness("report", again)
+    assert "Report:" in done.stdout, done.stdout + done.stderr
+    page = (again / "report.html").read_text(encoding="utf-8")
+    section = page[page.index('<section id="starts"') :]
+    assert "Lines lead from a failure" in section[: section.index("</section>")]
+    traces = TraceReader()
+    starts = drawn_starts(open_scene(run / "scene"), shipped.SEED, range(8))
+    for episode, start in starts.iterrows():
+        trace = traces.read(run / "traces" / f"{stage(ARM)}.parquet", int(str(episode)))
+        ego, person = (trace[(trace["step"] == 0) & (trace["player"] == name)].iloc[0] for name in ("ego", "non_ego"))
+        assert start["non_ego_ahead_m"] == pytest.approx(
+            person["x_m"] - ego["x_m"], abs=1e-3
+        )  # equal cars, straight on
+        assert start["non_ego_faster_mps"] == pytest.approx(person["speed_mps"] - ego["speed_mps"], abs=1e-3)
 
 
 # --- regression ---

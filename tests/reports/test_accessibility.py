@@ -8,7 +8,7 @@ from harness.evaluation.tables import table_of
 from harness.reports.index_page import IndexedRun, WorstCell, render_index
 from tests.support.chromium import accessibility_violations, unfold
 from tests.support.game_tables import findings, trait_row
-from tests.support.pages import campaign, rendered, with_errors
+from tests.support.pages import campaign, rendered, starts, with_errors
 
 GAME, OTHER = "naive_vs_speedy,1,6", "retrained_vs_speedy,1,6"
 
@@ -18,7 +18,7 @@ def report(write_report):
     arguments = campaign(games=20, quick=True)
     traits = table_of("attribution", [trait_row("all", 26, 2), trait_row("shoulder_glance", 26, 3, example=4)])
     errored = with_errors(arguments, arguments["episodes"]["episode"] == 14)
-    return write_report(errored, game=findings(), attribution=traits)
+    return write_report(errored, game=findings(), attribution=traits, starts=starts(20))
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -9,6 +9,7 @@ from typing import Any
 import pandas as pd
 
 from harness.campaign.plan.stages import AssessmentStage, TrainingStage, stage_id
+from harness.campaign.results.drawn_starts import drawn_starts
 from harness.campaign.results.matchups import matchups_of
 from harness.campaign.results.population_rows import by_who_drove
 from harness.campaign.results.read_run import ReadRun
@@ -52,6 +53,7 @@ def evaluated(run: ReadRun) -> RunTables:
         reconfiguration=run.reconfiguration,
         manoeuvres=run.manoeuvres,
         causes=run.causes,
+        starts=drawn_starts(run.scene, run.campaign.start_seed, run.episodes["episode"]),
         realism=found,
         game=_game(run),
         non_ego_drives=_people_drive(run),

@@ -9,6 +9,7 @@ import pandas as pd
 from rich.console import Console
 
 from harness.campaign.results.ci_files import write_ci_files
+from harness.campaign.results.drawn_starts import found_boundaries
 from harness.campaign.results.evaluate_run import csv_tables, evaluated
 from harness.campaign.results.kept_results import RunResult, keep_result
 from harness.campaign.results.model_cards import write_model_cards
@@ -39,7 +40,11 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     for name, table in csv_tables(run, tables).items():
         write_csv(table, folder.path / f"{name}.csv")
     write_model_cards(folder, tables.manifest, run.policies, tables.summary, tables.realism)
-    tables = replace(tables, replays=_write_replays(folder, run.scene, tables.of_own_traits(tables.episodes), console))
+    tables = replace(
+        tables,
+        replays=_write_replays(folder, run.scene, tables.of_own_traits(tables.episodes), console),
+        boundaries=found_boundaries(folder, run.scene),
+    )
     with doing(console, "writing the report"):
         games = recorded_games(
             tables.episodes, tables.arms, folder.traces_of_arm, run.scene, examples(tables.attribution)

@@ -5,6 +5,7 @@
                              of a reconfiguration: driver.toml
     traces/<stage>.parquet   one file per arm
     scene/                   a copy of the scene's files
+    pinned/<game>.toml       failures that `harness minimise` pinned, with what they need to be played again
     harness.log              what the commands did, and when
     .stages/<stage>/         what a stage needs to go on, or to be skipped: checkpoint, trials, segments, tables,
                              done.json
@@ -75,6 +76,15 @@ class RunFolder:
     @property
     def replays(self) -> Path:
         return self.path / "replays"
+
+    @property
+    def pinned(self) -> Path:
+        """Where `harness minimise` writes pinned games, unless it is told another folder."""
+        return self.path / "pinned"
+
+    @property
+    def pinned_games(self) -> list[Path]:
+        return sorted(self.pinned.glob("*.toml"))
 
     def policy(self, stage: str) -> Path:
         return self.path / "policies" / stage
