@@ -23,7 +23,7 @@ from harness.evaluation.column import (
 )
 from harness.evaluation.measured_game import METRICS_OF_CONDUCT, METRICS_OF_GAMES, METRICS_OF_PLAYERS
 from harness.evaluation.over_trainings_columns import OVER_TRAININGS
-from harness.evaluation.preventability_columns import PREVENTABILITY, REFERENCE_DRIVERS
+from harness.evaluation.preventability_columns import PREVENTABILITY, REFERENCE_DRIVERS, TAKEOVERS
 from harness.evaluation.severity.closeness import CRITERIA
 
 _T = "95 % t interval"
@@ -323,6 +323,7 @@ _TABLES = {
         *(_P, _P_HOLM, _VERDICT, _REASON),
     ),
     "reference_drivers": (*_GAME, _outcome("ego", "ego"), *REFERENCE_DRIVERS),
+    "takeovers": (ARM, SEED, EPISODE, *TAKEOVERS),
     "preventability": (ARM, PERSONA, SEED, *PREVENTABILITY),
 }
 TABLES: Mapping[str, Mapping[str, Column]] = {

@@ -86,6 +86,7 @@ class RunTables:
     """Empty: the report has no section on traits."""
     undecided: pd.DataFrame = field(default_factory=_empty("undecided"))
     reference_drivers: pd.DataFrame = field(default_factory=_empty("reference_drivers"))
+    takeovers: pd.DataFrame = field(default_factory=_empty("takeovers"))
     preventability: pd.DataFrame = field(default_factory=_empty("preventability"))
     """Empty: no failure was judged by reference drivers."""
     manoeuvres: pd.DataFrame | None = None

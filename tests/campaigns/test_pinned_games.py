@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -75,6 +77,20 @@ def test_preventability__every_failure_is_judged_by_every_driver_and_counted(run
     assert "Could the failures of the naive ego have been prevented?" in (run / "report.html").read_text(
         encoding="utf-8"
     )
+
+
+def test_preventability__the_course_of_a_driver_that_prevents_a_collision_is_in_the_page(run: Path) -> None:
+    judged, courses = read_csv(run / "reference_drivers.csv"), read_csv(run / "takeovers.csv")
+    prevents = judged[judged["prevented_from_conflict"] == 1].drop_duplicates(["arm", "episode"])
+    begun = courses.drop_duplicates(["arm", "episode"]).set_index(["arm", "episode"])
+    assert len(begun) == len(prevents) > 0
+    for row in prevents.itertuples():
+        first = begun.loc[(row.arm, row.episode)]
+        assert (first["driver"], first["step"] * 0.1) == (row.driver, pytest.approx(row.conflict_s))
+    page = (run / "report.html").read_text(encoding="utf-8")
+    embedded = json.loads(re.search(r'id="recorded">(.*?)</script>', page, re.DOTALL)[1])["games"]
+    shown = {(each["arm"], each["episode"]) for each in embedded if each["reference"] is not None}
+    assert shown == set(begun.index)
 
 
 def test_preventability__running_the_campaign_again_judges_nothing_again(run: Path, tmp_path: Path) -> None:

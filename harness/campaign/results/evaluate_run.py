@@ -53,6 +53,7 @@ def evaluated(run: ReadRun) -> RunTables:
         reconfiguration=run.reconfiguration,
         manoeuvres=run.manoeuvres,
         causes=run.causes,
+        takeovers=run.takeovers,
         starts=drawn_starts(run.scene, run.campaign.start_seed, run.episodes["episode"]),
         realism=found,
         game=_game(run),
@@ -80,7 +81,7 @@ def csv_tables(run: ReadRun, tables: RunTables) -> dict[str, pd.DataFrame]:
     """The tables that the run folder gets, by the names of their files."""
     names = ["episodes", "training", "summary", "comparisons", "causes", "manoeuvres", "realism", "undecided"]
     names += ["attribution"] if run.campaign.attribution is not None else []
-    names += ["reference_drivers", "preventability"] if run.reference_drivers is not None else []
+    names += ["reference_drivers", "takeovers", "preventability"] if run.reference_drivers is not None else []
     names += ["over_trainings"] if len(tables.over_trainings) else []
     names += ["populations"] if run.campaign.population else []
     names += ["reconfiguration"] if is_tuned(run.manifest) else []

@@ -15,7 +15,7 @@ from harness.campaign.plan.stages import Stage, stage_id
 from harness.campaign.results.shown_work import doing
 from harness.campaign.storage.arm_tables import PLAYED, arm_tables
 from harness.campaign.storage.manifest import planned
-from harness.campaign.storage.run_folder import JUDGED, RunFolder
+from harness.campaign.storage.run_folder import JUDGED, TAKEN_OVER, RunFolder
 from harness.config.campaign import Campaign
 from harness.config.toml_reading import Document
 from harness.drivers.policy_file import policy_files, read_card
@@ -53,6 +53,7 @@ class ReadRun:
     reconfiguration: pd.DataFrame
     reference_drivers: pd.DataFrame | None
     """None where no arm's failures are judged."""
+    takeovers: pd.DataFrame
 
     @property
     def done(self) -> set[str]:
@@ -72,7 +73,7 @@ def read_run(folder: RunFolder, console: Console) -> ReadRun:
     training = joined("training", _gathered(folder, manifest, "training", "training.csv"))
     searches = joined("reconfiguration", _gathered(folder, manifest, "reconfiguration", "reconfiguration.csv"))
     policies = {stage: _policy(folder.policy(stage)) for stage in _done(manifest, "training")}
-    judged = list(_gathered(folder, manifest, "preventability", JUDGED))
+    judged, courses = (list(_gathered(folder, manifest, "preventability", table)) for table in (JUDGED, TAKEN_OVER))
     with doing(console, "measuring the games"):
         arms = [arm_tables(folder, stage, scene) for stage in _done(manifest, "assessment")]
     return ReadRun(
@@ -88,6 +89,7 @@ def read_run(folder: RunFolder, console: Console) -> ReadRun:
         training=training,
         reconfiguration=searches,
         reference_drivers=joined("reference_drivers", judged) if judged else None,
+        takeovers=joined("takeovers", courses),
     )
 
 

@@ -14,13 +14,14 @@ from harness.campaign.results.evaluate_run import csv_tables, evaluated
 from harness.campaign.results.kept_results import RunResult, keep_result
 from harness.campaign.results.model_cards import write_model_cards
 from harness.campaign.results.read_run import read_run
-from harness.campaign.results.recorded_games import failing_paths, recorded_games, scene_drawing
+from harness.campaign.results.recorded_games import failing_paths, recorded_games, scene_drawing, takeovers_of
 from harness.campaign.results.replay_game import read_game
 from harness.campaign.results.shown_result import shown_result, verdicts_of
 from harness.campaign.results.shown_work import doing, progress_bar, say
 from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.run_log import LOGGER
 from harness.evaluation.comparisons.attribution import examples
+from harness.evaluation.comparisons.preventability import prevented_examples
 from harness.evaluation.tables import write_csv
 from harness.evaluation.trace_file import TraceReader
 from harness.evaluation.worst_first import worst_first
@@ -46,9 +47,9 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
         boundaries=found_boundaries(folder, run.scene),
     )
     with doing(console, "writing the report"):
-        games = recorded_games(
-            tables.episodes, tables.arms, folder.traces_of_arm, run.scene, examples(tables.attribution)
-        )
+        prevented = [(*arm, episode) for arm, episode in prevented_examples(tables.takeovers).items()]
+        shown_first, takeovers = [*examples(tables.attribution), *prevented], takeovers_of(tables.takeovers)
+        games = recorded_games(tables.episodes, tables.arms, folder.traces_of_arm, run.scene, shown_first, takeovers)
         paths = list(failing_paths(tables.episodes, tables.arms, folder.traces_of_arm, run.scene))
         page = render_page(tables, games, scene_drawing(run.scene), paths)
     write_atomically(folder.path / "report.html", page.encode())

@@ -40,6 +40,8 @@ from harness.files import content_of, drop_scratch, has_digest, leads_out, make_
 MANIFEST = "manifest.json"
 JUDGED = "reference_drivers.csv"
 """The table that the judgement of an arm's failures makes."""
+TAKEN_OVER = "takeovers.csv"
+"""Its table of the courses of reference drivers."""
 _PATIENCE_S = 10.0  # the time that workers of a killed command may take to end
 _MOST_MANIFEST_BYTES = 50_000_000
 _RUN = "run the campaign again"
