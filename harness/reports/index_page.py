@@ -87,10 +87,7 @@ def render_index(folder: str, runs: Sequence[IndexedRun], search: str = "") -> s
             "state": _state(run),
             "tone": _tone(run),
             "cells": _cells(run),
-            "compare": [
-                (other.name, f"compare/{quote(other.folder.name)}/{quote(run.folder.name)}")
-                for other in earlier(run, runs)[:1]
-            ],
+            "compare": _comparisons(run, earlier(run, runs)),
         }
         for run in shown
     ]
@@ -111,6 +108,16 @@ def earlier(run: IndexedRun, runs: Sequence[IndexedRun]) -> list[IndexedRun]:
         return []
     same = [each for each in runs if (each.ego, each.scene, each.state) == (run.ego, run.scene, "ended")]
     return same[same.index(run) + 1 :]
+
+
+def _comparisons(run: IndexedRun, before: Sequence[IndexedRun]) -> list[tuple[str, str]]:
+    """The comparison of a run with the one before it, and with all before it: each in words, with its address."""
+    chosen = [(f"compare with {before[0].name}", before[:1])] if before else []
+    chosen += [(f"history of {len(before) + 1} runs", before)] if len(before) > 1 else []
+    return [
+        (words, "/".join(("compare", *(quote(each.folder.name) for each in (*reversed(others), run)))))
+        for words, others in chosen
+    ]
 
 
 def terminal_table(runs: Sequence[IndexedRun]) -> Table:

@@ -116,6 +116,7 @@ def test_serve__of_a_folder_has_an_index_every_report_with_its_games_and_compari
     arm, _, seed, episode, *_ = json.loads(report.split('id="elsewhere">')[1].split("</script>")[0])[0]
     assert json.loads(read(f"{address}/first/games/{arm},{seed},{episode}.json"))["arm"] == arm
     assert "no difference" in read(f"{address}/compare/second/first")
+    assert "Comparison of 3 runs" in read(f"{address}/compare/second/first/second")
     assert 'href="/second/"' not in read(f"{address}/?search=first")
 
 
