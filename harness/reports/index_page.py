@@ -83,8 +83,8 @@ def render_index(folder: str, runs: Sequence[IndexedRun], search: str = "") -> s
     rows = [
         {
             "run": run,
-            "address": f"{quote(run.folder.name)}/" if run.has_page else "",
-            "state": _state(run),
+            "address": f"{quote(run.folder.name)}/" if run.has_page or run.state in ("running", "interrupted") else "",
+            "state": state_words(run),
             "tone": _tone(run),
             "cells": _cells(run),
             "compare": _comparisons(run, earlier(run, runs)),
@@ -130,7 +130,7 @@ def terminal_table(runs: Sequence[IndexedRun]) -> Table:
     for run in runs:
         rates = [MISSING if cell is None else percent(cell.failures / cell.games) for cell in (run.naive, run.last)]
         style = "red" if _tone(run) == "harm" else None
-        table.add_row(run.name, run.scene, run.finished_on, *rates, _state(run), style=style)
+        table.add_row(run.name, run.scene, run.finished_on, *rates, state_words(run), style=style)
     return table
 
 
@@ -145,7 +145,7 @@ def _cells(run: IndexedRun) -> list[str]:
     return [*made, _worst(run.naive), _worst(run.last)]
 
 
-def _state(run: IndexedRun) -> str:
+def state_words(run: IndexedRun) -> str:
     """What the run has come to, in words."""
     match run.state:
         case "unreadable":

@@ -8,6 +8,7 @@ from urllib.parse import parse_qs, quote, unquote, urlsplit
 
 from harness.campaign.results.compare_runs import compare_runs
 from harness.campaign.results.run_index import runs_in
+from harness.campaign.results.running_run import has_report, running_page
 from harness.campaign.results.served_report import PAGE, ServedReport
 from harness.campaign.storage.run_folder import MANIFEST, RunFolder
 from harness.reports.index_page import render_index
@@ -37,6 +38,8 @@ class ServedRuns:
         if RunFolder(run).is_published:
             report = run / "report.html"
             return (PAGE, report.read_bytes()) if not below and report.is_file() else None
+        if not has_report(run):
+            return (PAGE, running_page(run).encode()) if not below else None
         return self._report(first).answer(f"/{below}")
 
     def _is_run(self, name: str) -> bool:
