@@ -61,6 +61,9 @@ class Takeover:
     danger_step: int | None
     """The first step in which its rule says danger; None: it never does."""
     prevented: bool
+    course: FloatArray | None = None
+    """[T, 3] x_m, y_m, heading_rad of the ego from `danger_step` until `AFTERWARDS_S` after the recorded collision;
+    None unless it is prevented."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,11 +134,14 @@ class ConflictReplay:
         danger &= np.arange(steps)[:, None] < ends
         first = np.where(danger.any(axis=0), danger.argmax(axis=0), _NEVER)
         taken = np.flatnonzero(first != _NEVER)
-        prevented = np.zeros(games, dtype=bool)
-        prevented[taken] = self._prevented(taken, first[taken], lambda: driver)
+        courses = dict(zip(taken.tolist(), self._courses(taken, first[taken], lambda: driver), strict=True))
         return [
-            Takeover(danger_step=None if step == _NEVER else step, prevented=avoided)
-            for step, avoided in zip(first.tolist(), prevented.tolist(), strict=True)
+            Takeover(
+                danger_step=None if step == _NEVER else step,
+                prevented=courses.get(game) is not None,
+                course=courses.get(game),
+            )
+            for game, step in enumerate(first.tolist())
         ]
 
     def _observed(self) -> FloatArray:
@@ -150,13 +156,18 @@ class ConflictReplay:
 
     def _prevented(self, games: IntArray, steps: IntArray, driver: Callable[[], Driver]) -> BoolArray:
         """[N] whether a driver that takes over in collisions `games` [N] in `steps` [N] prevents them."""
-        prevented = np.zeros(len(games), dtype=bool)
+        return np.array([course is not None for course in self._courses(games, steps, driver)], dtype=bool)
+
+    def _courses(self, games: IntArray, steps: IntArray, driver: Callable[[], Driver]) -> list[FloatArray | None]:
+        """The course of a driver that takes over in each of the collisions `games` [N] in `steps` [N], as
+        `Takeover.course`."""
+        courses: list[FloatArray | None] = []
         for first in range(0, len(games), _GAMES_AT_ONCE):
             part = slice(first, first + _GAMES_AT_ONCE)
-            prevented[part] = self._prevented_at_once(games[part], steps[part], driver())
-        return prevented
+            courses += self._courses_at_once(games[part], steps[part], driver())
+        return courses
 
-    def _prevented_at_once(self, games: IntArray, steps: IntArray, driver: Driver) -> BoolArray:
+    def _courses_at_once(self, games: IntArray, steps: IntArray, driver: Driver) -> list[FloatArray | None]:
         replays = [
             CourseReplay(course=self._collisions[game].course, first_step=step, without_followers=True)
             for game, step in zip(games.tolist(), steps.tolist(), strict=True)
@@ -165,11 +176,14 @@ class ConflictReplay:
         arena = self._taken_over(games.tolist(), replays, [driver, *[SumoDriver()] * people])
         lengths = np.array([len(each.course.players) - 1 - each.first_step for each in replays])
         prevented = np.ones(len(replays), dtype=bool)
+        poses = [_poses_of_ego(arena)]
         for step in range(1, int(lengths.max()) + 1):
             arena.step()
             failed = np.isin(arena.state.outcome[:, EGO], (int(Outcome.COLLISION), int(Outcome.RAIL)))
             prevented &= ~(failed & (step <= lengths))
-        return prevented
+            poses.append(_poses_of_ego(arena))
+        driven = np.stack(poses, axis=1)  # [N, T, 3]
+        return [driven[row, : lengths[row] + 1] if avoided else None for row, avoided in enumerate(prevented.tolist())]
 
     def _taken_over(self, games: Sequence[int], replays: Sequence[CourseReplay], drivers: Sequence[Driver]) -> Arena:
         """An arena at the first step of each replay of the collisions `games` [N], with the ego's recorded acceleration
@@ -191,3 +205,9 @@ class ConflictReplay:
         distribution = self._scene.start_distribution([HumanFactors()] * len(present), present)
         drawn = draw_initial_state(distribution, *parts_of(self._seed, self._collisions[game].episode))
         return start_of(replay, drawn)
+
+
+def _poses_of_ego(arena: Arena) -> FloatArray:
+    """[N, 3] x_m, y_m, heading_rad."""
+    state = arena.state
+    return np.stack((state.x_m[:, EGO], state.y_m[:, EGO], state.heading_rad[:, EGO]), axis=-1)

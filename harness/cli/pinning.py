@@ -64,7 +64,7 @@ def minimise(
         raise UsageError.of("--all", str(episode), "names one game beside --all", "leave out EPISODE or --all")
     console, folder = Console(), RunFolder(run)
     found = None if policies is None else document_at(policies, "policies")
-    pinning = PinnedGames(folder, RunPlayers(folder, found, ego, allow_code), out or run / "pinned")
+    pinning = PinnedGames(folder, RunPlayers(folder, found, ego, allow_code), out or folder.pinned)
     if all_failures:
         chosen = pinning.failures(arm)
     else:
@@ -80,7 +80,7 @@ def minimise(
         print_plain(_found(pinned), console)
     if chosen:
         print_plain(
-            [f"To play them against another ego: harness regression {out or run / 'pinned'} --ego DRIVER"], console
+            [f"To play them against another ego: harness regression {out or folder.pinned} --ego DRIVER"], console
         )
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
+from urllib.parse import quote
 
 import typer
 
@@ -194,29 +196,50 @@ def runs(
 
 
 def compare(
-    before: Annotated[Path, typer.Argument(metavar="BEFORE", help="The run folder before the change.")],
-    after: Annotated[Path, typer.Argument(metavar="AFTER", help="The run folder after the change.")],
+    folders: Annotated[
+        list[Path], typer.Argument(metavar="RUN...", help="Two run folders or more, from the first to the last.")
+    ],
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="The page.  [default: compare.html in the second folder]")
+        Path | None, typer.Option(metavar="FILE", help="The page.  [default: compare.html in the last folder]")
     ] = None,
 ) -> None:
-    """Compare two runs, game by game: failures, near misses, harm to others and speed of every arm that both have."""
+    """Compare runs in their order, each with the one before it, game by game.
+
+    Failures, near misses, harm to others and speed of every arm that both have; the failures over all runs; and which
+    of them were fixed, are new or came back.
+    """
     from rich.console import Console
 
     from harness.campaign.results.compare_runs import compare_runs
     from harness.files import write_atomically
-    from harness.reports.comparison_page import headline
+    from harness.reports.comparison_page import BETTER, WORSE, change_sentences, history_table
 
-    console, page = Console(), out or after / "compare.html"
+    console, page = Console(), out or folders[-1] / "compare.html"
     if not page.absolute().parent.is_dir():
         raise UsageError.of(page, "", f"there is no folder {page.parent}", "create it, or name another file with --out")
-    rows, text = compare_runs(before, after)
-    write_atomically(page, text.encode())
-    for run in (before, after):
+    comparison = compare_runs(folders, [_address(each, page) for each in folders])
+    write_atomically(page, comparison.page().encode())
+    for run in folders:
         say_unchecked(run, console)
-    for row in rows:
-        print_plain([row.sentence], console, _STYLES[row.tone])
-    print_plain([headline(rows), f"Comparison: {page}"], console)
+    if comparison.histories:
+        console.print(history_table(comparison))
+    for transition in comparison.transitions:
+        print_plain([f"{transition.before.label} to {transition.after.label}: {transition.headline}"], console)
+        changed = [row for row in transition.rows if row.verdict in (WORSE, BETTER)]
+        for row in changed:
+            print_plain([f"  {row.sentence}"], console, _STYLES[row.tone])
+        if left := len(transition.rows) - len(changed):
+            print_plain([f"  {left} more figures are neither: the page has them"], console)
+        print_plain((f"  {sentence}" for sentence in change_sentences(transition)), console)
+    print_plain([f"Comparison: {page}"], console)
+
+
+def _address(run: Path, page: Path) -> str:
+    """The address of a run's report on a page; empty without one."""
+    report = run / "report.html"
+    return (
+        quote(Path(os.path.relpath(report.absolute(), page.absolute().parent)).as_posix()) if report.is_file() else ""
+    )
 
 
 def realism(run: RunPath, as_json: AsJson = False) -> None:

@@ -25,7 +25,7 @@ from harness.evaluation.falsification_columns import FALSIFICATION, SEARCHES
 from harness.evaluation.league_columns import LEAGUE_MEASURES, LEAGUE_PAIRING
 from harness.evaluation.measured_game import METRICS_OF_CONDUCT, METRICS_OF_GAMES, METRICS_OF_PLAYERS
 from harness.evaluation.over_trainings_columns import OVER_TRAININGS
-from harness.evaluation.preventability_columns import PREVENTABILITY, REFERENCE_DRIVERS
+from harness.evaluation.preventability_columns import PREVENTABILITY, REFERENCE_DRIVERS, TAKEOVERS
 from harness.evaluation.selection_columns import SELECTIONS
 from harness.evaluation.severity.closeness import CRITERIA
 from harness.evaluation.shield_columns import SHIELDS
@@ -337,6 +337,7 @@ _TABLES = {
     "searches": SEARCHES,
     "falsification": (*FALSIFICATION, _P_LOG_RANK, _P_HOLM, _VERDICT),
     "reference_drivers": (*_GAME, _outcome("ego", "ego"), *REFERENCE_DRIVERS),
+    "takeovers": (ARM, SEED, EPISODE, *TAKEOVERS),
     "preventability": (ARM, PERSONA, SEED, *PREVENTABILITY),
     "league": (*LEAGUE_PAIRING, SEED, ARM, _EPISODES, *LEAGUE_MEASURES),
 }

@@ -1,4 +1,4 @@
-"""The columns of the tables `reference_drivers` and `preventability`, but for those that many tables share."""
+"""The columns of the tables `reference_drivers`, `takeovers` and `preventability`, but those that many tables share."""
 
 from __future__ import annotations
 
@@ -32,6 +32,20 @@ REFERENCE_DRIVERS = (
     Column("preventable_until_s", NUMBER, "Last moment from which full braking prevents it, the other moving over."),
     Column("error", TEXT, "Why the game could not be played from the start; else empty."),
 )
+TAKEOVERS = (
+    _DRIVER,
+    Column(
+        "player",
+        TEXT,
+        "`ego`: as the driver drives it, from the step in which it takes over. A person: as it is taken to go on after "
+        "the recorded collision.",
+    ),
+    Column("step", COUNT, "The step, counted as in the recorded game."),
+    Column("x_m", NUMBER, "The centre of the body, in the coordinates of the net."),
+    Column("y_m", NUMBER, "As `x_m`."),
+    Column("heading_rad", NUMBER, "0 is the direction of x; counter-clockwise.", unit="rad"),
+)
+"""Of each collision that a reference driver prevents from the conflict on, the courses with the first that does."""
 PREVENTABILITY = (
     _DRIVER,
     Column("episodes", COUNT, "Games that were played.", label="games"),

@@ -1,21 +1,31 @@
-"""The comparison of two runs in words, and as a page that opens offline."""
+"""The comparison of runs in words, and as a page that opens offline."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from harness.evaluation.comparisons.run_comparison import Difference, Side
+from harness.evaluation.comparisons.run_history import ChangedGame, GameChange
 from harness.reports.differences import CHANCE, NO_RELEVANT_DIFFERENCE, RELEVANT_SPEED_MPS
+from harness.reports.embedding import key
+from harness.reports.figures import GAME
+from harness.reports.history_figures import PersonHistory, history_figures
 from harness.reports.numbers import MISSING, NO_SPACE, interval, number, percent, signed
 from harness.reports.page_template import environment_of
 from harness.reports.provenance import command_of, facts, made_by
 
+if TYPE_CHECKING:
+    from rich.table import Table
+
 BETTER, WORSE, UNKNOWN = "better", "worse", "not the same games"
 EQUAL, NOT_SHOWN = "no difference", "no difference shown"
 TONES = {BETTER: "mended", WORSE: "harm"}
+CHANGES: tuple[GameChange, ...] = get_args(GameChange)
+MOST_GAMES = 60
+"""Of an arm, seed and change that are listed by their numbers."""
 NOTHING_IN_COMMON = "The runs have no arm and seed in common."
 DIFFERENT_STARTS = (
     "The scenes or the first training seeds differ, so games have different starts: there are no pairs and no tests."
@@ -43,37 +53,131 @@ def compared_rows(differences: Sequence[Difference], significance: float) -> lis
     return sorted(rows, key=lambda row: order.get(row.verdict, 2))
 
 
+@dataclass(frozen=True, kw_only=True)
+class ComparedRun:
+    """One of the runs of a comparison."""
+
+    name: str
+    """Its folder."""
+    label: str
+    """Its name on axes and in headings."""
+    address: str
+    """Of its report; empty: it has none."""
+    manifest: Mapping[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Transition:
+    """What changes from a run to the next."""
+
+    before: ComparedRun
+    after: ComparedRun
+    same_starts: bool
+    significance: float
+    rows: Sequence[ComparedRow]
+    changes: Sequence[ChangedGame]
+
+    @property
+    def headline(self) -> str:
+        """The result in one line."""
+        return headline(self.rows)
+
+    @property
+    def counts(self) -> dict[str, dict[GameChange, int]]:
+        """How many games of each arm change, over all training seeds."""
+        found: dict[str, dict[GameChange, int]] = {}
+        for each in self.changes:
+            counts = found.setdefault(each.arm, dict.fromkeys(CHANGES, 0))
+            counts[each.change] += 1
+        return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """Two runs or more in their order."""
+
+    runs: Sequence[ComparedRun]
+    transitions: Sequence[Transition]
+    histories: Sequence[PersonHistory]
+
+    def page(self) -> str:
+        """The page as HTML. Equal input gives equal text."""
+        labels = [run.label for run in self.runs]
+        return (
+            environment_of("reports")
+            .get_template("compare.html.jinja")
+            .render(
+                runs=[
+                    (each.name, command_of(each.manifest), made_by(each.manifest), _facts(each)) for each in self.runs
+                ],
+                labels=labels,
+                figures=list(history_figures(self.histories, labels)),
+                histories=[
+                    (each.ego, each.person, [each.text(place) or MISSING for place in range(len(labels))])
+                    for each in self.histories
+                ],
+                transitions=[(each, list(_changed(each))) for each in self.transitions],
+                different_starts=DIFFERENT_STARTS,
+                several_seeds=len({row.found.seed for each in self.transitions for row in each.rows}) > 1,
+            )
+        )
+
+
 def headline(rows: Sequence[ComparedRow]) -> str:
-    """The result of the comparison in one line."""
+    """The result of a comparison of two runs in one line."""
     if not rows:
         return NOTHING_IN_COMMON
     worse, better = (sum(row.verdict == verdict for row in rows) for verdict in (WORSE, BETTER))
     return f"Worse: {worse} of {len(rows)} figures; better: {better}."
 
 
-def render_comparison(
-    runs: Sequence[tuple[str, Mapping[str, Any]]],
-    rows: Sequence[ComparedRow],
-    *,
-    same_starts: bool,
-    significance: float,
-) -> str:
-    """The page as HTML. `runs` are name and manifest of both runs. Equal input gives equal text."""
-    return (
-        environment_of("reports")
-        .get_template("compare.html.jinja")
-        .render(
-            runs=[
-                (name, command_of(each), made_by(each), facts(each, (), len(each.get("personas", ()))))
-                for name, each in runs
-            ],
-            rows=rows,
-            headline=headline(rows),
-            remark="" if same_starts else DIFFERENT_STARTS,
-            significance=significance,
-            several_seeds=len({row.found.seed for row in rows}) > 1,
-        )
-    )
+def history_table(comparison: Comparison) -> Table:
+    """The failures of each ego against each person in each run, for the terminal."""
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    for heading in ("ego", "against"):
+        table.add_column(heading, no_wrap=True)
+    for run in comparison.runs:
+        table.add_column(run.label, overflow="fold")
+    for each in comparison.histories:
+        cells = [each.text(place) or MISSING for place in range(len(comparison.runs))]
+        table.add_row(each.ego, each.person, *cells)
+    return table
+
+
+def change_sentences(transition: Transition) -> Iterator[str]:
+    """How many failures are fixed, new or came back, a line for each arm."""
+    for arm, counts in transition.counts.items():
+        words = ", ".join(f"{count} {change}" for change, count in counts.items() if count)
+        yield f"{arm}: {words}"
+
+
+def _facts(run: ComparedRun) -> Sequence[tuple[str, Any]]:
+    return facts(run.manifest, (), len(run.manifest.get("personas", ())))
+
+
+def _changed(transition: Transition) -> Iterator[dict[str, Any]]:
+    """The games that change, a line for each arm, seed and kind of change: each number with the addresses of the game
+    in the run before and in the one after."""
+    runs = transition.before, transition.after
+    groups: dict[tuple[str, int, GameChange], list[int]] = {}
+    for each in sorted(transition.changes, key=lambda each: (each.arm, each.seed, CHANGES.index(each.change))):
+        groups.setdefault((each.arm, each.seed, each.change), []).append(each.episode)
+    for (arm, seed, change), episodes in groups.items():
+        games = [(episode, *(_address(run, arm, seed, episode) for run in runs)) for episode in episodes]
+        yield {
+            "arm": arm,
+            "seed": seed,
+            "change": change,
+            "tone": "mended" if change == "fixed" else "harm",
+            "count": len(games),
+            "games": games[:MOST_GAMES],
+        }
+
+
+def _address(run: ComparedRun, arm: str, seed: int, episode: int) -> str:
+    return f"{run.address}{GAME}{key(arm, seed, episode)}" if run.address else ""
 
 
 def _row(found: Difference, significance: float) -> ComparedRow:

@@ -20,6 +20,8 @@ function control(root) {
     button("play").setAttribute("aria-pressed", playing);
     button("road").hidden = !player.beside;
     button("road").textContent = player.oneRoad ? "Two roads" : "One road";
+    button("reference").hidden = !player.screens.some(screen => screen.game.reference);
+    button("reference").setAttribute("aria-pressed", player.reference);
     button("view").textContent = player.follows ? "Follow" : "Whole road";
     button("view").setAttribute("aria-pressed", player.follows);
   }
@@ -112,12 +114,16 @@ function control(root) {
       player.seek(player.time);
       remember();
     },
+    reference: () => {
+      player.reference = !player.reference;
+      player.seek(player.time);
+    },
     link: copyLink,
   };
   const keys = {
     " ": "play", ",": "back", ".": "on", Home: "start", End: "end", ArrowLeft: "secondBack", ArrowRight: "secondOn",
     ArrowUp: "faster", ArrowDown: "slower", "+": "in", "=": "in", "-": "out", 0: "resetView", f: "view", n: "later",
-    p: "earlier", b: "beside", c: "contact", g: "road", l: "link",
+    p: "earlier", b: "beside", c: "contact", g: "road", l: "link", r: "reference",
   };
 
   for (const each of root.querySelectorAll("[data-do]")) each.addEventListener("click", () => actions[each.dataset.do]());

@@ -42,8 +42,9 @@ COLUMNS = {
     "leader_gap_m": PackedColumn(0.1, 1),
     "time_to_collision_s": PackedColumn(0.1, 1),
 }
-"""The columns of a player, in their order; background vehicles have the first `BACKGROUND_COLUMNS` of them."""
-BACKGROUND_COLUMNS = 4
+"""The columns of a player, in their order; background vehicles have the first `BACKGROUND_COLUMNS` of them, and those
+of `Reference` the first `REFERENCE_COLUMNS`."""
+BACKGROUND_COLUMNS, REFERENCE_COLUMNS = 4, 3
 NOTHING = -1
 """Stands for a missing gap or time."""
 LONGEST = 1e5
@@ -67,6 +68,16 @@ class Track:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Reference:
+    """How a reference driver prevents a collision."""
+
+    driver: str
+    """In words, after "the"."""
+    players: Sequence[Track]
+    """The ego as it drives it, and the people as they are taken to go on after the recorded collision."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class GameTracks:
     """One game, step 0 to step `steps`."""
 
@@ -82,6 +93,8 @@ class GameTracks:
     background: Sequence[Track]
     touches: Sequence[tuple[float, float, float]]
     """Time (s) and place (x, y in m) of each contact."""
+    reference: Reference | None = None
+    """How a reference driver takes over and prevents the collision; None: none does."""
 
 
 Marks = Mapping[str, Sequence[Mapping[str, Any]]]
@@ -118,7 +131,8 @@ def embedded_games(
 def recorded_document(scene: Mapping[str, Any] | None, games: Iterable[str]) -> Markup:
     """Texts of games, and the road, as JSON that is safe inside a script element. `road.js` reads the scene."""
     columns = json_text(list(COLUMNS.values()))
-    head = f'"columns":{columns},"backgroundColumns":{BACKGROUND_COLUMNS},"scene":{json_text(scene)}'
+    counts = f'"backgroundColumns":{BACKGROUND_COLUMNS},"referenceColumns":{REFERENCE_COLUMNS}'
+    head = f'"columns":{columns},{counts},"scene":{json_text(scene)}'
     return Markup("{" + head + ',"games":[' + ",\n".join(games) + "]}")
 
 
@@ -145,6 +159,7 @@ def game_text(game: GameTracks, marks: Marks, causes: Causes, crowds: Crowds) ->
             "leastTime": round(measured[0], 2) if measured else None,
             "players": players,
             "background": [_track(vehicle) for vehicle in game.background],
+            "reference": None if game.reference is None else _reference(game.reference),
             "touches": [[round(time_s, 3), round(x_m, 2), round(y_m, 2)] for time_s, x_m, y_m in game.touches],
             "marks": list(marks.get(key(game.arm, game.seed, game.episode), ())),
             "packed": pack(columns_of(game)),
@@ -157,9 +172,13 @@ def _track(track: Track) -> dict[str, Any]:
     return {"name": track.name, "size": size, "first": track.first_step, "count": len(track.columns["x_m"])}
 
 
+def _reference(reference: Reference) -> dict[str, Any]:
+    return {"driver": reference.driver, "players": [_track(track) for track in reference.players]}
+
+
 def columns_of(game: GameTracks) -> Iterator[tuple[IntArray, int]]:
     """A game's columns as whole numbers, track by track, each with the number of its differences."""
-    for track in (*game.players, *game.background):
+    for track in (*game.players, *game.background, *(game.reference.players if game.reference else ())):
         for name, values in track.columns.items():
             unit, differences = COLUMNS[name]
             yield _whole(values, unit), differences

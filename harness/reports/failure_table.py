@@ -23,21 +23,14 @@ from harness.evaluation.strategies import (
 )
 from harness.game.roles import NON_EGO
 from harness.reports.game_links import GameLinks
-from harness.reports.numbers import NO_SPACE, percent
+from harness.reports.numbers import percent
 from harness.reports.run_tables import Row, RunTables, failures, played
+from harness.reports.severity_wording import RISK_TONES, risk_tone
 
 NOBODY, ORDINARY, WORST_KNOWN = "nobody", "SUMO’s driver", "worst known opponent"
 TAKES_OVER = "UN R157’s driver takes over"
 AXES = (0.05, 0.1, 0.2, 0.4, 0.6, 1.0)
 """The ends that the common axis of failure rates may have."""
-TONES = {
-    "none": "no failure",
-    "small": f"1{NO_SPACE}%",
-    "medium": f"10{NO_SPACE}%",
-    "severe": f"more than 10{NO_SPACE}%",
-    "unknown": "no collision, or not known",
-}
-"""The colours of cells: the probability of a serious injury (MAIS3+) in a collision, by the upper bound of its mean."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +43,7 @@ class FailureCell:
     spans: Sequence[tuple[float, float, float]]
     """For each training seed the share and its 95 % interval."""
     tone: str
-    """A key of `TONES`."""
+    """A key of `RISK_TONES`."""
     game: str = ""
     """The address of its worst game on the page; empty without one."""
 
@@ -83,7 +76,7 @@ def failure_table(tables: RunTables, links: GameLinks) -> dict[str, Any] | None:
         "columns": columns,
         "lines": lines,
         "top": top,
-        "tones": {tone: words for tone, words in TONES.items() if any(cell.tone == tone for cell in cells)},
+        "tones": {tone: words for tone, words in RISK_TONES.items() if any(cell.tone == tone for cell in cells)},
     }
 
 
@@ -158,20 +151,8 @@ def _share(rows: Sequence[Row]) -> float:
 
 def _tone(rows: Sequence[Row]) -> str:
     known = [row for row in rows if np.isfinite(row["mais3_risk_high"])]
-    risk = np.nan
-    if known:
-        risk = np.average([row["mais3_risk_high"] for row in known], weights=[row["collisions"] for row in known])
-    return tone_of(sum(map(failures, rows)), float(risk))
-
-
-def tone_of(failed: int, risk: float) -> str:
-    """A key of `TONES`, for a number of failures and the mean risk of a serious injury in their collisions (NaN: not
-    known)."""
-    if not failed:
-        return "none"
-    if not np.isfinite(risk):
-        return "unknown"
-    return "small" if risk <= 0.01 else "medium" if risk <= 0.1 else "severe"
+    risks, collisions = ([row[name] for row in known] for name in ("mais3_risk_high", "collisions"))
+    return risk_tone(np.average(risks, weights=collisions) if known else np.nan)
 
 
 def _taken_over(persona: str, tables: RunTables) -> FailureCell | None:

@@ -20,8 +20,16 @@ if TYPE_CHECKING:
 INK, GRID = "#010101", "#010102"
 SERIES = {"alone": "#010111", "sumo": "#010112", "persona": "#010113", "retrained": "#010114"}
 ROAD = {"asphalt": "#010121", "rail": "#010122", "ego": "#010123", "non-ego": "#010124", "contact": "#010125"}
+TONES = {
+    "ink": "#010130",
+    "mended": "#010131",
+    "severity-small": "#010132",
+    "severity-medium": "#010133",
+    "severity-severe": "#010134",
+    "open": "#010135",
+}
 _PAGE_COLOURS = {INK: "currentColor", GRID: "var(--grid)"} | {
-    stand_in: f"var(--{name})" for name, stand_in in (SERIES | ROAD).items()
+    stand_in: f"var(--{name})" for name, stand_in in (SERIES | ROAD | TONES).items()
 }
 _STYLE = {
     "svg.fonttype": "none",

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from harness.evaluation.comparisons.preventability import prevented_examples
 from harness.evaluation.rule_book.causes import cause_lines
 from harness.evaluation.strategies import NAIVE_VS_SUMO, NaiveEgo, against_persona
+from harness.reports.embedding import key
 from harness.reports.focus import Focus, focus_of
 from harness.reports.key_figures import egos_of
 from harness.reports.next_steps import NextStep
@@ -31,6 +33,8 @@ class FirstAnswer:
     command: str = ""
     game: str = ""
     """The key of the game to watch."""
+    watch: str = "Watch it here"
+    """The text of the link to it."""
 
 
 def first_answers(tables: RunTables, steps: Sequence[NextStep]) -> list[FirstAnswer]:
@@ -43,7 +47,10 @@ def first_answers(tables: RunTables, steps: Sequence[NextStep]) -> list[FirstAns
     answers = [
         FirstAnswer(question="Why does it fail?", lines=list(_why(focus, tables))),
         FirstAnswer(
-            question="Could it have been prevented?", lines=[each for name in told for each in _prevented(name, tables)]
+            question="Could it have been prevented?",
+            lines=[each for name in told for each in _prevented(name, tables)],
+            game=next((game for name in told for game in _prevented_games(name, tables)), ""),
+            watch="Watch how a reference driver prevents one",
         ),
         FirstAnswer(question="How severe is it?", lines=[each for name in told for each in _severe(name, tables)]),
         FirstAnswer(
@@ -98,6 +105,14 @@ def _prevented(persona: str, tables: RunTables) -> Iterator[str]:
         yield f"Of the failures against {persona} the driver of UN R157 prevents {'; '.join(clauses)}."
     for made in not_judged:
         yield f"The failures of the {made} against {persona} are not judged."
+
+
+def _prevented_games(persona: str, tables: RunTables) -> Iterator[str]:
+    """The keys of the games that show how a reference driver prevents a failure against a persona."""
+    arms = {arm for _, _, arm in egos_of(persona, tables)}
+    for (arm, seed), episode in prevented_examples(tables.takeovers).items():
+        if arm in arms:
+            yield key(arm, seed, episode)
 
 
 def _severe(persona: str, tables: RunTables) -> Iterator[str]:

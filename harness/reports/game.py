@@ -19,7 +19,7 @@ from harness.evaluation.gap_verdict import GapVerdict
 from harness.reports.data_table import table
 from harness.reports.game_links import GameLinks
 from harness.reports.gap_sentences import both_sides, induced_failures, induced_in_several
-from harness.reports.heatmaps import views
+from harness.reports.heatmaps import LEAST_SHARE, views
 from harness.reports.numbers import (
     MISSING,
     interval,
@@ -59,7 +59,7 @@ def game_section(findings: GameFindings | None, links: GameLinks) -> dict[str, A
     return {
         "cautions": [(seed, as_sentence(reason)) for seed, reason in findings.cautions],
         "verdicts": gap_verdicts(findings.gaps),
-        "views": views(findings.crossplay, links),
+        "views": views(findings.crossplay, findings.equilibria, links),
         "solutions": equilibrium_sentences(findings.equilibria),
         "new_personas": [
             {"ego": ego, "trained_against": met, "non_ego": non_ego, **_new_persona(rows[rows["pairs"] > 0])}
@@ -201,7 +201,7 @@ def _held_out(row: Row) -> str:
 
 
 def _mixture(rows: Sequence[Row]) -> str:
-    played = [row for row in rows if row["share"] >= 0.0005]
+    played = [row for row in rows if row["share"] >= LEAST_SHARE]
     if len(played) == 1:
         return f"{played[0]['player']} alone"
     return " + ".join(f"{percent(row['share'])} {row['player']}" for row in played)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
+from harness.evaluation.game_theory.empirical_game import SolutionKind
 from harness.evaluation.worst_first import worst_first
 from harness.game.arrays import FloatArray
 from harness.reports.figures import GAME, INK, SERIES, figure_of, svg
@@ -23,6 +25,12 @@ if TYPE_CHECKING:
 WorstGames = Mapping[tuple[str, int | None], str]
 """The address of the worst game of each arm and seed, and under the seed None of each arm."""
 
+Pairs = Collection[tuple[str, str]]
+"""An ego and a non-ego each."""
+
+IN_EQUILIBRIUM = "Framed: what an equilibrium of each persona’s game plays, the first of its table."
+LEAST_SHARE = 0.0005
+"""A strategy with a smaller share is not played."""
 OPENS_A_GAME = "A cell opens the worst of its games."
 PALEST, DARKEST = 0.04, 0.5
 """Opacity of the least and the greatest value: text on them is legible on a dark and on a light page."""
@@ -75,18 +83,32 @@ QUANTITIES = (
 )
 
 
-def views(crossplay: pd.DataFrame, links: GameLinks) -> list[dict[str, Any]]:
+def views(crossplay: pd.DataFrame, equilibria: pd.DataFrame, links: GameLinks) -> list[dict[str, Any]]:
     """The heat maps of `crossplay`: of its seed, or of the mean over its seeds first and then of each. A cell leads to
-    the worst of its games. Each view has its `label` and its `maps`, a dictionary for each quantity."""
+    the worst of its games; those of a seed that are played in an equilibrium have a frame. Each view has its `label`
+    and its `maps`, a dictionary for each quantity."""
     worst = _worst_games(links)
     seeds = list(dict.fromkeys(crossplay["seed"]))
-    shown = [(f"seed {seed}", crossplay[crossplay["seed"] == seed]) for seed in seeds]
-    if len(seeds) > 1:
-        shown.insert(0, (f"mean over {len(seeds)} seeds", _mean(crossplay)))
-    return [
-        {"label": label, "maps": [_map(quantity, rows, label, place, worst) for quantity in QUANTITIES]}
-        for place, (label, rows) in enumerate(shown)
+    shown: list[tuple[str, pd.DataFrame, Pairs]] = [
+        (f"seed {seed}", crossplay[crossplay["seed"] == seed], _in_equilibrium(equilibria, int(seed))) for seed in seeds
     ]
+    if len(seeds) > 1:
+        shown.insert(0, (f"mean over {len(seeds)} seeds", _mean(crossplay), ()))
+    return [
+        {"label": label, "maps": [_map(quantity, rows, label, place, worst, framed) for quantity in QUANTITIES]}
+        for place, (label, rows, framed) in enumerate(shown)
+    ]
+
+
+def _in_equilibrium(equilibria: pd.DataFrame, seed: int) -> Pairs:
+    """The pairs that the first equilibrium of each persona's game plays, in the order of the table."""
+    solved = equilibria[(equilibria["seed"] == seed) & (equilibria["solution"] == SolutionKind.NASH.value)]
+    played = solved[(solved["number"] == 1) & (solved["share"] >= LEAST_SHARE)]
+    pairs: list[tuple[str, str]] = []
+    for _, rows in played.groupby("game", sort=False):
+        egos, non_egos = (rows.loc[rows["role"] == role, "player"] for role in ("ego", "non_ego"))
+        pairs += product(egos, non_egos)
+    return pairs
 
 
 def _worst_games(links: GameLinks) -> WorstGames:
@@ -107,7 +129,9 @@ def _mean(crossplay: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(means).reset_index()
 
 
-def _map(quantity: _Quantity, crossplay: pd.DataFrame, label: str, place: int, worst: WorstGames) -> dict[str, Any]:
+def _map(
+    quantity: _Quantity, crossplay: pd.DataFrame, label: str, place: int, worst: WorstGames, framed: Pairs
+) -> dict[str, Any]:
     """One heat map: its title, caption, figure and width; `place` makes its ids unique. Each persona's strategies are
     side by side."""
     personas = dict(zip(crossplay["non_ego"], crossplay["persona"], strict=True))
@@ -127,16 +151,19 @@ def _map(quantity: _Quantity, crossplay: pd.DataFrame, label: str, place: int, w
     with figure_of(width_in, height_in) as figure:
         axes = _axes(figure, egos, non_egos)
         _draw_cells(axes, quantity, crossplay, pd.DataFrame(shades, egos, non_egos), worst)
+        _draw_frames(axes, egos, non_egos, framed)
         for drawing in (*axes.texts, *axes.patches):
             drawing.set_in_layout(False)  # they are within the axes; to measure them again is slow
         name = f"heat-{quantity.name.replace('_', '-')}-{place}"
-        element = svg(figure, name, f"{title}: {'; '.join(numbers)}")
+        played = "; ".join(f"{ego} against {non_ego}" for ego, non_ego in framed)
+        solution = f". In equilibrium: {played}" if played else ""
+        element = svg(figure, name, f"{title}: {'; '.join(numbers)}{solution}")
     spread = f"95 % interval ({'Clopper-Pearson' if quantity.per_cent else 't'})"
     if label.startswith("mean"):
         spread = "least to most of the seeds that played it"
     unpaid = " SUMO’s own driver has no payoff." if quantity.name == "non_ego_payoff" and "" in order else ""
     caption = f"{quantity.caption}{unpaid} Below each mean: {spread}."
-    caption = f"{caption} {OPENS_A_GAME}" if GAME in element else caption
+    caption = " ".join([caption, *([IN_EQUILIBRIUM] if framed else []), *([OPENS_A_GAME] if GAME in element else [])])
     return {"title": title, "caption": caption, "figure": element, "width_in": round(width_in, 2)}
 
 
@@ -173,6 +200,14 @@ def _draw_cells(
             bar.set_url(worst.get((cell["arm"], cell.get("seed"))) or None)
             axes.text(column + 0.5, row + 0.46, quantity.text(cell[quantity.name]), ha="center", color=INK)
             axes.text(column + 0.5, row + 0.82, quantity.span(cell), ha="center", fontsize=8, color=INK)
+
+
+def _draw_frames(axes: Axes, egos: list[str], non_egos: list[str], framed: Pairs) -> None:
+    from matplotlib.patches import Rectangle
+
+    for ego, non_ego in framed:
+        corner = (non_egos.index(non_ego) + 0.025, egos.index(ego) + 0.04)
+        axes.add_patch(Rectangle(corner, 0.95, 0.92, fill=False, edgecolor=INK, linewidth=1.6))
 
 
 def _shades(quantity: _Quantity, values: FloatArray, personas: list[str]) -> FloatArray:

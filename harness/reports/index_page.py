@@ -83,14 +83,11 @@ def render_index(folder: str, runs: Sequence[IndexedRun], search: str = "") -> s
     rows = [
         {
             "run": run,
-            "address": f"{quote(run.folder.name)}/" if run.has_page else "",
-            "state": _state(run),
+            "address": f"{quote(run.folder.name)}/" if run.has_page or run.state in ("running", "interrupted") else "",
+            "state": state_words(run),
             "tone": _tone(run),
             "cells": _cells(run),
-            "compare": [
-                (other.name, f"compare/{quote(other.folder.name)}/{quote(run.folder.name)}")
-                for other in earlier(run, runs)[:1]
-            ],
+            "compare": _comparisons(run, earlier(run, runs)),
         }
         for run in shown
     ]
@@ -113,6 +110,16 @@ def earlier(run: IndexedRun, runs: Sequence[IndexedRun]) -> list[IndexedRun]:
     return same[same.index(run) + 1 :]
 
 
+def _comparisons(run: IndexedRun, before: Sequence[IndexedRun]) -> list[tuple[str, str]]:
+    """The comparison of a run with the one before it, and with all before it: each in words, with its address."""
+    chosen = [(f"compare with {before[0].name}", before[:1])] if before else []
+    chosen += [(f"history of {len(before) + 1} runs", before)] if len(before) > 1 else []
+    return [
+        (words, "/".join(("compare", *(quote(each.folder.name) for each in (*reversed(others), run)))))
+        for words, others in chosen
+    ]
+
+
 def terminal_table(runs: Sequence[IndexedRun]) -> Table:
     """The index for the terminal, without what only the page has room for."""
     from rich.table import Table
@@ -123,7 +130,7 @@ def terminal_table(runs: Sequence[IndexedRun]) -> Table:
     for run in runs:
         rates = [MISSING if cell is None else percent(cell.failures / cell.games) for cell in (run.naive, run.last)]
         style = "red" if _tone(run) == "harm" else None
-        table.add_row(run.name, run.scene, run.finished_on, *rates, _state(run), style=style)
+        table.add_row(run.name, run.scene, run.finished_on, *rates, state_words(run), style=style)
     return table
 
 
@@ -138,7 +145,7 @@ def _cells(run: IndexedRun) -> list[str]:
     return [*made, _worst(run.naive), _worst(run.last)]
 
 
-def _state(run: IndexedRun) -> str:
+def state_words(run: IndexedRun) -> str:
     """What the run has come to, in words."""
     match run.state:
         case "unreadable":

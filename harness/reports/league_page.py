@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from harness.evaluation.league_columns import NOBODY, SUMO_DRIVER
-from harness.reports.failure_table import ORDINARY, TONES, FailureCell, tone_of
+from harness.reports.failure_table import ORDINARY, FailureCell
 from harness.reports.numbers import NO_SPACE, interval, number, percent
 from harness.reports.page_template import environment_of
+from harness.reports.severity_wording import RISK_TONES, risk_tone
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -43,7 +44,7 @@ def render_league(ego: str, table: pd.DataFrame, addresses: Sequence[str], faile
             columns=[person_in_words(each) for each in columns],
             lines=[(scene, [cells.get((scene, person), []) for person in columns]) for scene in scenes],
             headings=HEADINGS,
-            tones=TONES,
+            tones=RISK_TONES,
             rows=[(address, list(_texts(row))) for row, address in zip(rows, addresses, strict=True)],
             failed=failed,
         )
@@ -77,11 +78,12 @@ def person_in_words(person: str) -> str:
 def _cell(row: Mapping[Any, Any], address: str) -> FailureCell:
     collisions, played = row["collisions"], row["episodes"] - row["errors"]
     injured = row["serious_injuries"] * played
+    risk = injured / collisions if injured > 0.0 and collisions > 0 else math.nan
     return FailureCell(
         rate=percent(row["failure_rate"]),
         counts=_counts(row),
         spans=(),
-        tone=tone_of(_failures(row), injured / collisions if injured > 0.0 and collisions > 0 else math.nan),
+        tone=risk_tone(risk) if _failures(row) else "none",
         game=address,
     )
 

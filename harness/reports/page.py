@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from harness.evaluation.competence import DID_NOT_LEARN
-from harness.evaluation.unplayed_games import reasons_of
 from harness.reports import human_ranges
 from harness.reports.acceptance_wording import acceptance_lines, by_sentence, headline
 from harness.reports.arm_figures import MOST_DOTS
@@ -24,10 +22,12 @@ from harness.reports.game_links import GameLinks
 from harness.reports.learning import learning, searches, stopped
 from harness.reports.manoeuvres import causes_by_game, failures_by_cause, marks_of
 from harness.reports.next_steps import next_steps
+from harness.reports.page_header import header, troubles
 from harness.reports.page_template import CONTENT_POLICY, ELSEWHERE, LIBRARIES, SCRIPTS, environment_of, sources
-from harness.reports.provenance import QUICK, asked_alone, command_of, facts, made_by, mixed_versions
-from harness.reports.run_tables import RunTables, unplayed
+from harness.reports.provenance import asked_alone
+from harness.reports.run_tables import RunTables
 from harness.reports.scope_wording import planned_in_words
+from harness.reports.start_section import start_section
 
 MOST_ROWS = 10_000
 """The page leaves out a longer table of games and refers to its CSV file."""
@@ -71,12 +71,13 @@ def render_page(
     arms, pairs = failures_by_cause(tables.of_own_traits(tables.causes), texts)
     steps = next_steps(tables)
     page = environment.get_template("report.html.jinja").render(
-        **_header(tables),
-        **_troubles(tables),
+        **header(tables),
+        **troubles(tables),
         acceptance=_acceptance(tables),
         failure_table=failure_table(tables, links),
         answers=first_answers(tables, steps),
         attribution=attribution_section(tables, links),
+        starts=start_section(tables),
         next_steps=steps,
         cards=[card(persona, place, tables, links, scene, paths) for place, persona in enumerate(tables.personas, 1)],
         most_dots=MOST_DOTS if tables.episodes.groupby("arm").size().max() > MOST_DOTS else 0,
@@ -110,38 +111,6 @@ def render_page(
         script=sources(environment, SCRIPTS),
     )
     return page.strip() + "\n"
-
-
-def _header(tables: RunTables) -> dict[str, Any]:
-    manifest = tables.manifest
-    return {
-        "command": command_of(manifest),
-        "made_by": made_by(manifest),
-        "name": manifest.get("name", "campaign"),
-        "facts": facts(manifest, tables.seeds, len(tables.personas)),
-        "quick": QUICK if manifest.get("quick") else "",
-        "trained_before": tables.campaign.get("policies") or "",
-        "several_seeds": tables.several_seeds,
-        "change": tables.change,
-    }
-
-
-def _troubles(tables: RunTables) -> dict[str, Any]:
-    """The banners: what is unfinished, what could not be played, and what makes the numbers mean less."""
-    errored = tables.episodes[unplayed(tables.episodes)]
-    return {
-        "unfinished": tables.unfinished,
-        "not_learned": [
-            (name, stopped(each)) for name, each in tables.stages.items() if each.get("stopped") == DID_NOT_LEARN
-        ],
-        "mixed": mixed_versions(tables.stages),
-        "errored": errored.groupby(["arm", "seed"], sort=False).size().items(),
-        "errors": len(errored),
-        "varying": list(tables.manifest.get("varying_drivers", {}).items()),
-        "learned_elsewhere": list(tables.manifest.get("learned_elsewhere", {}).items()),
-        "error_reasons": reasons_of(errored["error"]),
-        "ego_games": int(tables.episodes["ego_failed"].notna().sum()),
-    }
 
 
 def _acceptance(tables: RunTables) -> tuple[bool, str, list[Any]] | None:

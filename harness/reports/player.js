@@ -3,7 +3,7 @@
 class Player {
   /** `screens` is the element the games are shown in; `changed` is called whenever the time or the games change. */
   constructor(screens, changed) {
-    Object.assign(this, { element: screens, changed, screens: [], time: 0, speed: 1, playing: false, follows: true, oneRoad: false });
+    Object.assign(this, { element: screens, changed, screens: [], time: 0, speed: 1, playing: false, follows: true, oneRoad: false, reference: true });
     this.opening = 0;
   }
 
@@ -15,9 +15,9 @@ class Player {
     return this.screens[1]?.game;
   }
 
-  /** When the last of the games ends. */
+  /** When the last of the games ends, or what is shown of a reference driver. */
   get duration() {
-    return Math.max(0, ...this.screens.map(screen => screen.game.duration));
+    return Math.max(0, ...this.screens.map(screen => (this.reference && screen.game.reference || screen.game).duration));
   }
 
   /** Show a game, or two, at a time; without a time at the last contact or the end. */
@@ -53,7 +53,10 @@ class Player {
 
   seek(time) {
     this.time = Math.min(Math.max(time, 0), this.duration);
-    for (const screen of this.screens) screen.draw(this.time);
+    for (const screen of this.screens) {
+      screen.reference = this.reference;
+      screen.draw(this.time);
+    }
     this.changed();
   }
 

@@ -45,12 +45,21 @@ function opened(game) {
     };
     for (const track of game.players) columns(track, COLUMNS);
     for (const track of game.background) columns(track, COLUMNS.slice(0, recorded.backgroundColumns));
+    if (game.reference) whatIf(game, track => columns(track, COLUMNS.slice(0, recorded.referenceColumns)));
     game.duration = game.steps * game.step;
     game.touches = game.touches.map(([time, x, y]) => ({ time, x, y }));
     game.packed = null;
     return game;
   });
   return game.promise;
+}
+
+/** Read the tracks of a reference driver that prevents the collision, a game of its own with the same clock. */
+function whatIf(game, read) {
+  const { reference, step, persona } = game;
+  reference.players.forEach(read);
+  const steps = Math.max(...reference.players.map(track => track.first + track.count - 1));
+  Object.assign(reference, { step, steps, persona, duration: steps * step });
 }
 
 /** The bytes of deflated bytes in base64. */

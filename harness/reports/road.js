@@ -8,7 +8,7 @@ const repaint = new Set();
 function readPalette() {
   const style = getComputedStyle(document.documentElement);
   for (const name of ["paper", "ink", "faint", "line", "grid", "ego", "non-ego", "other", "asphalt", "verge", "mark",
-    "rail", "goal", "lapse", "contact"]) {
+    "rail", "goal", "lapse", "contact", "mended"]) {
     palette[name] = style.getPropertyValue(`--${name}`).trim();
   }
 }

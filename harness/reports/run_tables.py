@@ -14,6 +14,7 @@ from harness.evaluation.comparisons.acceptance_checks import Check
 from harness.evaluation.comparisons.preventability import by_regulation, sentences_of
 from harness.evaluation.game_theory.findings import GameFindings
 from harness.evaluation.rule_book.causes import cause_lines
+from harness.evaluation.start_space import Boundary
 from harness.evaluation.strategies import (
     NAIVE_ALONE,
     Arm,
@@ -80,11 +81,16 @@ class RunTables:
     """Empty: the ego has no shield."""
     populations: pd.DataFrame = field(default_factory=_empty("populations"))
     causes: pd.DataFrame = field(default_factory=_empty("causes"))
+    starts: pd.DataFrame = field(default_factory=pd.DataFrame)
+    """The quantities that differ between the starts (`start_space.start_quantities`), by episode."""
+    boundaries: Sequence[Boundary] = ()
+    """Those that `harness minimise` found."""
     realism: pd.DataFrame = field(default_factory=_empty("realism"))
     attribution: pd.DataFrame = field(default_factory=_empty("attribution"))
     """Empty: the report has no section on traits."""
     undecided: pd.DataFrame = field(default_factory=_empty("undecided"))
     reference_drivers: pd.DataFrame = field(default_factory=_empty("reference_drivers"))
+    takeovers: pd.DataFrame = field(default_factory=_empty("takeovers"))
     preventability: pd.DataFrame = field(default_factory=_empty("preventability"))
     """Empty: no failure was judged by reference drivers."""
     manoeuvres: pd.DataFrame | None = None

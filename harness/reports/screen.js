@@ -15,6 +15,7 @@ class GameScreen {
     this.game = game;
     this.others = []; // games beside this one: the same view, their players as outlines
     this.oneRoad = false; // whether this screen stands for the others too
+    this.reference = true; // whether the reference driver that prevents the collision is drawn
     this.camera = new Camera(46);
     this.view = make("canvas", { class: "view", role: "img" });
     this.curves = make("div", { class: "curves", role: "img", "aria-label": this.described() });
@@ -53,6 +54,10 @@ class GameScreen {
     const { game } = this;
     const badge = make("span", { class: `badge ${game.outcome === "goal" ? "well" : "failed"}`, text: OUTCOMES[game.outcome] ?? game.outcome });
     const title = make("h3", {}, document.createTextNode(`${titleOf(game)} `), badge);
+    if (game.reference) {
+      const from = (game.reference.players[0].first * game.step).toFixed(1);
+      title.append(make("span", { class: "prevented", text: `prevented by the ${game.reference.driver} that takes over at ${from} s` }));
+    }
     if (game.cause) title.append(make("span", { class: "cause", text: game.cause }));
     return title;
   }
@@ -83,24 +88,29 @@ class GameScreen {
     const { context, ratio, width, height } = sheet;
     const shown = Math.min(time, game.duration);
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    camera.look([game, ...this.others], this.others.length ? time : shown, width, height);
+    const reference = this.reference && game.reference, ended = time > game.duration + 1e-6;
+    if (reference && ended) camera.look([reference], time, width, height);
+    else camera.look([game, ...this.others], this.others.length ? time : shown, width, height);
     drawRoad(context, camera, ratio);
     for (const other of this.others) drawGhost(context, camera, ratio, other, time, this.oneRoad);
-    drawGame(context, camera, ratio, game, shown, true);
+    if (reference) drawReference(context, camera, ratio, reference, time);
+    const labels = drawGame(context, camera, ratio, game, shown, true);
+    if (reference) drawReferenceNames(context, camera, reference, time, labels);
     drawScaleBar(context, camera);
-    if (time > game.duration + 1e-6) this.drawEnded(context, width);
+    if (ended) this.drawEnded(context, width, reference);
     const [x, y] = camera.place(0, 0);
     this.view.dataset.camera = [x, y, camera.scale].map(value => value.toFixed(4)).join(" ");
     this.strips?.draw(time);
     this.say(shown);
   }
 
-  drawEnded(context, width) {
+  drawEnded(context, width, reference) {
     context.font = `600 ${FONT}`;
     context.textAlign = "right";
     context.textBaseline = "top";
     context.fillStyle = palette.ink;
-    context.fillText(`ended at ${this.game.duration.toFixed(1)} s`, width - 10, 8);
+    const after = reference ? "; the others are taken to go on" : "";
+    context.fillText(`ended at ${this.game.duration.toFixed(1)} s${after}`, width - 10, 8);
   }
 
   /** The values of the moment as text. */

@@ -11,6 +11,14 @@ from harness.reports.run_tables import Row
 
 SMALL_DELTA_V_MPS = 3.0
 """Below this change of velocity a collision is called small. Our own: just above 10 km/h."""
+RISK_TONES = {
+    "none": "no failure",
+    "small": f"1{NO_SPACE}%",
+    "medium": f"10{NO_SPACE}%",
+    "severe": f"more than 10{NO_SPACE}%",
+    "unknown": "no collision, or not known",
+}
+"""The colours of failures: the probability of a serious injury (MAIS3+) in a collision, by its upper bound."""
 _RISK = "the probability of a serious injury (MAIS3+)"
 
 
@@ -31,6 +39,13 @@ def severity_clause(ego: str, rows: Sequence[Row]) -> str:
         means = f"{number(mean_mps, 1)}{NO_SPACE}m/s on average, " if collisions > 1 else ""
         words = f"{which} of the {ego}: delta-v {means}at most {number(most_mps, 1)}{NO_SPACE}m/s"
     return f"{words}{_risk(rows)}"
+
+
+def risk_tone(risk: float) -> str:
+    """The key of `RISK_TONES` of an upper bound of the probability in a failure; NaN: it is not known."""
+    if not np.isfinite(risk):
+        return "unknown"
+    return "small" if risk <= 0.01 else "medium" if risk <= 0.1 else "severe"
 
 
 def _risk(rows: Sequence[Row]) -> str:

@@ -116,6 +116,23 @@ def test_takeovers__the_upper_bound_prevents_what_a_person_prevents(straight: Op
         assert (np.array(prevented[name]) <= np.array(prevented["upper_bound"])).all()
 
 
+def test_takeovers__the_course_of_a_prevented_collision_begins_at_the_danger_and_stays_behind_the_other(
+    straight: OpenScene,
+) -> None:
+    courses = [cut_in(straight, gap_m=gap, own_kmh=60, other_kmh=20, approach_mps=1.2) for gap in (4.0, 40.0)]
+    collisions = [Collision(episode=place, course=course) for place, course in enumerate(courses)]
+    too_late, prevented = ConflictReplay(straight, collisions, seed=1).takeovers()["careful_and_competent"]
+    assert (too_late.prevented, too_late.course) == (False, None)
+    assert prevented.course is not None
+    assert prevented.danger_step is not None
+    recorded = courses[1].players[prevented.danger_step :]
+    assert len(prevented.course) == len(recorded)
+    assert prevented.course[0] == pytest.approx(recorded[0, EGO, :3])
+    at_collision = courses[1].failed_step - prevented.danger_step
+    assert prevented.course[at_collision, 0] < recorded[at_collision, EGO, 0]
+    assert (recorded[:, 1, 0] - prevented.course[:, 0] > LENGTH_M).all()
+
+
 def test_chances__last_moment_is_that_of_the_braking_distance(straight: OpenScene) -> None:
     """Closing at 11.11 m/s, braking at 0.8 g = 7.85 m/s^2 needs 11.11^2 / 15.7 = 7.86 m, and the brakes build it up
     with a jerk of 12.65 m/s^3 and a lag of 0.2 s: closing speeds of 10.98, 10.73, 10.35, 9.84, 9.22, 8.53, 7.80, 7.04,

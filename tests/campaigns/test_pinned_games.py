@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -10,10 +12,13 @@ from xml.etree import ElementTree
 import pandas as pd
 import pytest
 
+from harness.campaign.results.drawn_starts import drawn_starts
 from harness.config.pinned_game import PinnedGame
 from harness.config.toml_reading import read_document
 from harness.errors import NOT_ACCEPTED
 from harness.evaluation.tables import read_csv
+from harness.evaluation.trace_file import TraceReader
+from harness.road.scene.open_scene import open_scene
 from tests.support import shipped
 from tests.support.shipped import NAIVE, PERSON, POLICIES, RETRAINED, stage
 from tests.support.tiny import SHIPPED, carried_out, finished, harness, numbers, write_campaign
@@ -74,6 +79,20 @@ def test_preventability__every_failure_is_judged_by_every_driver_and_counted(run
     )
 
 
+def test_preventability__the_course_of_a_driver_that_prevents_a_collision_is_in_the_page(run: Path) -> None:
+    judged, courses = read_csv(run / "reference_drivers.csv"), read_csv(run / "takeovers.csv")
+    prevents = judged[judged["prevented_from_conflict"] == 1].drop_duplicates(["arm", "episode"])
+    begun = courses.drop_duplicates(["arm", "episode"]).set_index(["arm", "episode"])
+    assert len(begun) == len(prevents) > 0
+    for row in prevents.itertuples():
+        first = begun.loc[(row.arm, row.episode)]
+        assert (first["driver"], first["step"] * 0.1) == (row.driver, pytest.approx(row.conflict_s))
+    page = (run / "report.html").read_text(encoding="utf-8")
+    embedded = json.loads(re.search(r'id="recorded">(.*?)</script>', page, re.DOTALL)[1])["games"]
+    shown = {(each["arm"], each["episode"]) for each in embedded if each["reference"] is not None}
+    assert shown == set(begun.index)
+
+
 def test_preventability__running_the_campaign_again_judges_nothing_again(run: Path, tmp_path: Path) -> None:
     again, campaign = shutil.copytree(run, tmp_path / "pinned"), run.with_suffix(".toml")
     assert "Nothing to do" in carried_out(campaign, again)
@@ -117,6 +136,30 @@ def test_minimise__says_what_is_wrong(run: Path, failed: list[int]) -> None:
         done = harness("minimise", *arguments)
         assert done.returncode == 2
         assert words in done.stderr
+
+
+# --- the report's picture of the starts ---
+
+
+def test_report__draws_each_start_as_it_was_played_and_the_boundary_that_was_found(
+    run: Path, pinned: Path, tmp_path: Path
+) -> None:
+    again = shutil.copytree(run, tmp_path / "run")
+    shutil.copytree(pinned, again / "pinned")
+    done = harness("report", again)
+    assert "Report:" in done.stdout, done.stdout + done.stderr
+    page = (again / "report.html").read_text(encoding="utf-8")
+    section = page[page.index('<section id="starts"') :]
+    assert "Lines lead from a failure" in section[: section.index("</section>")]
+    traces = TraceReader()
+    starts = drawn_starts(open_scene(run / "scene"), shipped.SEED, range(8))
+    for episode, start in starts.iterrows():
+        trace = traces.read(run / "traces" / f"{stage(ARM)}.parquet", int(str(episode)))
+        ego, person = (trace[(trace["step"] == 0) & (trace["player"] == name)].iloc[0] for name in ("ego", "non_ego"))
+        assert start["non_ego_ahead_m"] == pytest.approx(
+            person["x_m"] - ego["x_m"], abs=1e-3
+        )  # equal cars, straight on
+        assert start["non_ego_faster_mps"] == pytest.approx(person["speed_mps"] - ego["speed_mps"], abs=1e-3)
 
 
 # --- regression ---

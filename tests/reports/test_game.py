@@ -14,7 +14,7 @@ from harness.evaluation.game_theory.empirical_game import equilibria
 from harness.evaluation.tables import columns_of, table_of, write_csv
 from harness.reports.game import CAPTIONS, equilibrium_sentences, game_section, selection_sentences
 from harness.reports.game_links import GameLinks
-from harness.reports.heatmaps import OPENS_A_GAME, views
+from harness.reports.heatmaps import IN_EQUILIBRIUM, OPENS_A_GAME, views
 from tests.support.chromium import COLOURS, contrast, rgb, unfold
 from tests.support.game_tables import findings
 from tests.support.pages import Page, campaign, plain, rendered
@@ -91,7 +91,7 @@ def test_heat_map__a_cell_links_to_the_worst_of_its_games(found):
     outcomes, severity = ["goal", "collision", "goal"], [0.0, 300.0, 0.0]
     episodes = games.assign(seed=[1, 1, 2], episode=[0, 7, 3], ego_outcome=outcomes, severity=severity)
     worst = "naive_vs_speedy,1,7"
-    mean, first, second = views(found.crossplay, GameLinks(embedded={worst}, episodes=episodes))
+    mean, first, second = views(found.crossplay, found.equilibria, GameLinks(embedded={worst}, episodes=episodes))
     for view in (mean, first):
         assert f'href="#game={worst}"' in view["maps"][0]["figure"]
         assert OPENS_A_GAME in view["maps"][0]["caption"]
@@ -102,9 +102,27 @@ def test_heat_map__a_cell_links_to_the_worst_of_its_games(found):
 def test_heat_map__has_a_personas_strategies_side_by_side(found):
     rows = found.crossplay[found.crossplay["seed"] == 1]
     rows = pd.concat([rows[rows["non_ego"] != "speedy_round2"], rows[rows["non_ego"] == "speedy_round2"]])
-    figure = views(rows, NO_LINKS)[0]["maps"][0]["figure"]
+    figure = views(rows, found.equilibria, NO_LINKS)[0]["maps"][0]["figure"]
     names = re.findall(r">(speedy|speedy_round2|distracted|sumo)</text>", figure)
     assert names == ["speedy", "speedy_round2", "distracted", "sumo"]
+
+
+def test_heat_map__frames_what_an_equilibrium_plays(found):
+    solved = found.equilibria[(found.equilibria["seed"] == 2) & (found.equilibria["number"] == 1)]
+    players = solved[(solved["solution"] == "nash") & (solved["share"] > 0.001)].groupby(["game", "role"])["player"]
+    played = players.apply(list)
+    pairs = {
+        f"{ego} against {non_ego}"
+        for game in ("speedy", "distracted")
+        for ego in played[game, "ego"]
+        for non_ego in played[game, "non_ego"]
+    }
+    (mean, _, second) = game_section(found, NO_LINKS)["views"]
+    for each in second["maps"]:
+        assert set(re.search(r"In equilibrium: ([^\"]*)", each["figure"])[1].split("; ")) == pairs
+        assert each["figure"].count("stroke-width: 1.6") == len(pairs)
+        assert IN_EQUILIBRIUM in each["caption"]
+    assert all("In equilibrium" not in each["figure"] + each["caption"] for each in mean["maps"])
 
 
 # --- where there is nothing ---

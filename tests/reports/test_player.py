@@ -9,10 +9,12 @@ import pytest
 from harness.reports.embedding import key
 from tests.support.chromium import ready_s, until
 from tests.support.pages import blank_figures, campaign, recordings, rendered
-from tests.support.recorded import STEP_S, recorded
+from tests.support.recorded import PREVENTED, STEP_S, recorded
 from tests.support.repository import REPOSITORY
 
 GAME, OTHER = "naive_vs_speedy,1,6", "retrained_vs_speedy,1,6"  # a collision, and the same episode after retraining
+
+JUDGED = f"naive_vs_speedy,1,{PREVENTED}"  # a collision that a reference driver prevents
 
 
 @pytest.fixture(scope="module")
@@ -226,6 +228,30 @@ def test_one_road__shows_the_other_game_as_ghosts(player, games):
     assert pixel(page, 0, *place) not in (colour(page, "--asphalt"), colour(page, "--non-ego"))
     again = player(page.evaluate("location.hash"))
     assert again.locator(".screen:visible").count() == 1
+
+
+# --- the reference driver ---
+
+
+def test_reference__is_drawn_beyond_the_collision_until_it_is_switched_off(player, games):
+    game = games[JUDGED]
+    page = player(f"#game={JUDGED}&t={game.steps * STEP_S}")
+    heading = page.locator(".screen h3").first.inner_text()
+    assert "prevented by the careful and competent driver that takes over at 3.0 s" in heading
+    car, person = game.reference.players
+    step = game.steps + 8
+    scrub(page, step * STEP_S)
+    for track, name in ((car, "--mended"), (person, "--non-ego")):
+        place = [float(track.columns[each][step - track.first_step]) for each in ("x_m", "y_m")]
+        shades = pixel(page, 0, *place), colour(page, name), colour(page, "--asphalt")
+        assert shades[0] not in shades[1:]  # a tint on the road
+    switch = page.get_by_role("button", name="Reference driver")
+    switch.click()
+    assert switch.get_attribute("aria-pressed") == "false"
+    assert time_of(page) == pytest.approx(game.steps * STEP_S)
+    press(page, "r", "End")
+    assert time_of(page) == pytest.approx((game.steps + 10) * STEP_S)
+    assert player(f"#game={OTHER}").get_by_role("button", name="Reference driver").is_hidden()
 
 
 # --- the list of games ---

@@ -108,6 +108,17 @@ def campaign(
     }
 
 
+def starts(episodes: int = GAMES) -> pd.DataFrame:
+    """The starts of such a campaign. Those of later games are farther ahead: `campaign` lets the first ones fail."""
+    random = np.random.default_rng(3)
+    quantities = {
+        "non_ego_ahead_m": np.arange(episodes) - 8.0,
+        "non_ego_faster_mps": random.uniform(-3.0, 3.0, episodes),
+        "ego_speed_mps": random.uniform(11.0, 14.0, episodes),
+    }
+    return pd.DataFrame(quantities, index=pd.RangeIndex(episodes, name="episode"))
+
+
 def _compared(
     manifest: Mapping[str, Any],
     episodes: pd.DataFrame,

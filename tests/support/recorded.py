@@ -12,8 +12,11 @@ from harness.evaluation.tables import table_of
 from harness.evaluation.worst_first import worst_first
 from harness.game.arrays import FloatArray
 from harness.replay.selection import choose_games
-from harness.reports.embedding import GameTracks, Track
+from harness.reports.embedding import COLUMNS, REFERENCE_COLUMNS, GameTracks, Reference, Track
 
+PREVENTED = 9
+"""The episode of the collisions that a reference driver prevents."""
+REFERENCE = list(COLUMNS)[:REFERENCE_COLUMNS]
 STEP_S, STEPS = 0.1, 80
 OUTLINE = [[0, 0], [220, 0], [220, -3.2], [130, -3.2], [100, -6.4], [0, -6.4], [0, 0]]
 SCENE: dict[str, Any] = {
@@ -59,8 +62,25 @@ def recorded_game(row: Any, background: int = 2) -> GameTracks:
         outcome=outcome,
         players=players,
         background=along,
+        reference=_reference(*players) if outcome == "collision" and row.episode == PREVENTED else None,
         touches=[(float(time[-1]), float(players[0].columns["x_m"][-1]), y_m[outcome])] if touching else [],
     )
+
+
+def _reference(ego: Track, person: Track) -> Reference:
+    """A driver takes the ego over after 3 s and falls back by up to 15 m; the person goes on for a second."""
+    return Reference(
+        driver="careful and competent driver", players=[_going_on(ego, 30, -15.0), _going_on(person, -1, 0.0)]
+    )
+
+
+def _going_on(track: Track, first_step: int, offset_m: float) -> Track:
+    """The track from a step on and for another second, with an offset that grows to this one."""
+    columns = {name: np.append(track.columns[name][first_step:], [track.columns[name][-1]] * 10) for name in REFERENCE}
+    columns["x_m"][-10:] += np.arange(1, 11) * STEP_S * track.columns["speed_mps"][-1]
+    columns["x_m"] += np.linspace(0.0, offset_m, len(columns["x_m"]))
+    first_step %= len(track.columns["x_m"])
+    return Track(name=track.name, size_m=track.size_m, first_step=first_step, columns=columns)
 
 
 def _player(name: str, time: FloatArray, random: np.random.Generator, outcome: str, speed_mps: float) -> Track:

@@ -23,6 +23,7 @@ from harness.campaign.plan.stages import (
 from harness.campaign.plan.strategy_stages import training_settings
 from harness.campaign.preflight import OpenCampaign
 from harness.campaign.storage.checksums import digest_of
+from harness.campaign.storage.run_folder import JUDGED, TAKEN_OVER
 from harness.drivers.policy_file import policy_files
 from harness.drivers.reference_drivers import reference_identity
 
@@ -61,6 +62,7 @@ def _inputs(campaign: OpenCampaign, stage: Stage) -> dict[str, Any]:
         case PreventabilityStage():
             inputs["references"] = reference_identity()
             inputs["continuations"] = [each.value for each in Continuation]
+            inputs["tables"] = [JUDGED, TAKEN_OVER]
         case _:
             inputs["episodes"] = document.assessment.episodes
     if isinstance(stage, AssessmentStage | SelectionStage | PreventabilityStage) and stage.seed != document.start_seed:

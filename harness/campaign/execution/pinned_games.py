@@ -33,7 +33,6 @@ from harness.evaluation.tables import read_csv
 from harness.evaluation.worst_first import worst_first
 from harness.files import make_folder, write_atomically
 from harness.game.arrays import FloatArray
-from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import draw_initial_state
 from harness.game.seeding import parts_of
 
@@ -154,10 +153,7 @@ class PinnedGames:
 
     def _start_of(self, episode: int) -> FloatArray:
         """[2 P] the start that is drawn for an episode."""
-        scene = self._players.scene
-        players = len(scene.world.roles)
-        distribution = scene.start_distribution([HumanFactors()] * players, [1.0] * players)
-        drawn = draw_initial_state(distribution, *parts_of(self._players.start_seed, episode))
+        drawn = draw_initial_state(self._players.scene.usual_starts, *parts_of(self._players.start_seed, episode))
         return np.concatenate((drawn.position_m, drawn.speed_mps))
 
     def _write(self, place: str, content: bytes) -> str:

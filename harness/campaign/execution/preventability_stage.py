@@ -2,6 +2,7 @@
 
 <work>/segments/<driver>.json      the games that one reference driver has played, with the versions that played them
 <work>/reference_drivers.csv       a row for each failure and reference driver
+<work>/takeovers.csv               the courses in collisions that a driver prevents from the conflict on
 
 So the judgement continues with the next reference driver after an interruption. What a driver does in a game depends on
 nothing but itself: the table is the same bytes with and without interruptions.
@@ -9,12 +10,14 @@ nothing but itself: the table is the same bytes with and without interruptions.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from harness.assessment.conflict_replay import Collision, ConflictReplay, collision_of
+import numpy as np
+
+from harness.assessment.conflict_replay import Collision, ConflictReplay, Takeover, collision_of
 from harness.assessment.continuation import Continuation
 from harness.assessment.rollout import assess_batches
 from harness.campaign.execution.player_factory import PlayerFactory
@@ -23,7 +26,7 @@ from harness.campaign.plan.planned_drivers import SumoDriven
 from harness.campaign.plan.stages import PreventabilityStage
 from harness.campaign.storage.arm_tables import arm_tables
 from harness.campaign.storage.checksums import intact_record, write_checksums
-from harness.campaign.storage.run_folder import JUDGED
+from harness.campaign.storage.run_folder import JUDGED, TAKEN_OVER
 from harness.campaign.storage.versions import versions_of_numbers
 from harness.drivers.car import car_of
 from harness.drivers.mixture import mixture_of
@@ -32,7 +35,7 @@ from harness.evaluation.competence import broken_by
 from harness.evaluation.tables import table_of, write_csv
 from harness.evaluation.trace_file import TraceReader
 from harness.files import make_folder
-from harness.game.roles import EGO
+from harness.game.roles import EGO, NON_EGO
 from harness.road.scene.open_scene import OpenScene
 
 _COLLISIONS_AT_ONCE = 100  # what the ego sees in each of their steps is kept in memory
@@ -41,7 +44,7 @@ _COLLISIONS_AT_ONCE = 100  # what the ego sees in each of their steps is kept in
 def carry_out_preventability(
     stage: PreventabilityStage, run: StageRun, scene: OpenScene
 ) -> tuple[dict[str, Any], list[Path]]:
-    """Judge every failure of an arm; the facts, and the file of the table.
+    """Judge every failure of an arm; the facts, and the files of the tables.
 
     The run is told of each episode before it is played, and of the games played and their number. Raises UsageError for
     damaged files of the arm, SimulationError if SUMO can't load the scene.
@@ -50,7 +53,7 @@ def carry_out_preventability(
     episodes = arm_tables(folder, of.id).episodes
     failures = episodes[(episodes["error"] == "") & (episodes["ego_failed"] == 1)]
     numbers = [int(episode) for episode in failures["episode"]]
-    conflicts, failed_s = _from_conflict(scene, folder.traces(of.id), numbers, run.context.document.start_seed)
+    conflicts, courses, failed_s = _from_conflict(scene, folder.traces(of.id), numbers, run.context.document.start_seed)
     starts = _from_start(stage, run, scene, numbers)
     rows = []
     for failure in failures.itertuples():
@@ -70,16 +73,21 @@ def carry_out_preventability(
                 "failed_s": failed_s[episode],
             }
             rows.append(row | conflicts.get((episode, name), {}))
-    table = folder.work(stage.id) / JUDGED
-    write_csv(table_of("reference_drivers", rows), table)
+    driven = [{"arm": of.name, "seed": of.seed, **row} for _, each in sorted(courses.items()) for row in each]
+    tables = {JUDGED: table_of("reference_drivers", rows), TAKEN_OVER: table_of("takeovers", driven)}
+    for file, table in tables.items():
+        write_csv(table, folder.work(stage.id) / file)
     errors = int((episodes["error"] != "").sum()) + sum(row["error"] != "" for row in rows)
-    return {"episodes": len(numbers), "errors": errors, "versions": [versions_of_numbers()]}, [table]
+    return {"episodes": len(numbers), "errors": errors, "versions": [versions_of_numbers()]}, [
+        folder.work(stage.id) / file for file in tables
+    ]
 
 
 def _from_conflict(
     scene: OpenScene, traces: Path, episodes: Sequence[int], start_seed: int
-) -> tuple[dict[tuple[int, str], dict[str, Any]], dict[int, float]]:
-    """The cells of the verdict from the conflict on, by episode and driver; and when each game failed."""
+) -> tuple[dict[tuple[int, str], dict[str, Any]], dict[int, list[dict[str, Any]]], dict[int, float]]:
+    """The cells of the verdict from the conflict on, by episode and driver; by episode, the rows of courses with the
+    first of `REFERENCES` that prevents the collision; and when each game failed."""
     reader, step_s, ego = TraceReader(), scene.world.step_s, scene.world.roles[EGO]
     collisions: dict[Continuation, list[Collision]] = {each: [] for each in Continuation}
     failed_s = {}
@@ -91,6 +99,7 @@ def _from_conflict(
             if (collision := collision_of(trace, scene, episode, continuation)) is not None:
                 found.append(collision)
     cells: dict[tuple[int, str], dict[str, Any]] = {}
+    courses: dict[int, list[dict[str, Any]]] = {}
     for first in range(0, len(collisions[Continuation.IN_ITS_PLACE]), _COLLISIONS_AT_ONCE):
         part = slice(first, first + _COLLISIONS_AT_ONCE)
         in_place, moving = (ConflictReplay(scene, collisions[each][part], start_seed) for each in Continuation)
@@ -103,13 +112,32 @@ def _from_conflict(
                     "preventable_from_s": chance.first_step,
                     "preventable_until_s": chance.last_step,
                 }
+                if takeover.prevented and collision.episode not in courses:
+                    courses[collision.episode] = list(_takeover_rows(name, takeover, collision, scene.world.roles))
                 times = {column: None if step is None else step * step_s for column, step in steps.items()}
                 cells[collision.episode, name] = {
                     **times,
                     "prevented_from_conflict": int(takeover.prevented),
                     "prevented_moving_over": int(worse.prevented),
                 }
-    return cells, failed_s
+    return cells, courses, failed_s
+
+
+def _takeover_rows(
+    driver: str, takeover: Takeover, collision: Collision, roles: Sequence[str]
+) -> Iterator[dict[str, Any]]:
+    """The rows of the table of courses on a collision that a driver prevents."""
+    assert takeover.course is not None
+    assert takeover.danger_step is not None
+    course, after = collision.course, collision.course.failed_step
+    courses = [(roles[EGO], takeover.danger_step, takeover.course)]
+    for player in range(NON_EGO, len(roles)):
+        if course.players_present[after, player]:
+            courses.append((roles[player], after, course.players[after:, player, :3]))
+    for player_name, first_step, poses in courses:
+        for step, pose in enumerate(np.round(poses, 4).tolist(), first_step):
+            cells = dict(zip(("x_m", "y_m", "heading_rad"), pose, strict=True))
+            yield {"episode": collision.episode, "driver": driver, "player": player_name, "step": step, **cells}
 
 
 def _from_start(

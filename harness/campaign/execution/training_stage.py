@@ -13,6 +13,7 @@ from harness.campaign.execution.stage_run import StageRun
 from harness.campaign.plan.planned_drivers import SumoDriven, description, driver_in
 from harness.campaign.plan.stages import TrainingStage
 from harness.campaign.plan.strategy_stages import training_settings
+from harness.campaign.storage.training_curves import CHECKPOINT
 from harness.campaign.storage.versions import versions_since
 from harness.drivers.policy_file import persona_hash, policy_files, read_policy, write_policy
 from harness.drivers.policy_origin import origin_card
@@ -32,7 +33,7 @@ def carry_out_training(stage: TrainingStage, run: StageRun, scene: OpenScene) ->
     Raises as `PlayerFactory.player` does, StageFailed where the training itself fails.
     """
     folder, spec = run.context.folder, _spec(stage, run, scene)
-    checkpoint = folder.work(stage.id) / "checkpoint.safetensors"
+    checkpoint = folder.work(stage.id) / CHECKPOINT
     versions = versions_since(checkpoint)
     try:
         result = train(

@@ -1,37 +1,77 @@
-"""The comparison of two run folders: a page, and lines for the terminal."""
+"""The comparison of run folders in their order: a page, and what the terminal shows."""
 
 from __future__ import annotations
 
 import posixpath
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.results.read_run import episodes_of
+from harness.campaign.storage.manifest import planned
 from harness.campaign.storage.run_folder import RunFolder
+from harness.errors import UsageError
 from harness.evaluation.comparisons.run_comparison import differences_of
-from harness.reports.comparison_page import ComparedRow, compared_rows, render_comparison
+from harness.evaluation.comparisons.run_history import changed_games, failure_rates
+from harness.reports.comparison_page import ComparedRun, Comparison, Transition, compared_rows
+from harness.reports.history_figures import histories
 
 
-def compare_runs(before: Path, after: Path) -> tuple[list[ComparedRow], str]:
-    """The differences between the games of two run folders, and the page that shows them. Raises UsageError for a
-    folder that is no run, one without games, and results that were changed."""
-    folders = [RunFolder(run) for run in (before, after)]
-    manifests = [folder.manifest() for folder in folders]
-    games = [episodes_of(folder) for folder in folders]
-    scenes = [_scene(manifest) for manifest in manifests]
-    first, second = (manifest["seeds"][0] for manifest in manifests)  # starts are drawn from them
-    same_starts = bool(scenes[0]) and scenes[0] == scenes[1] and first == second
-    significance = manifests[1]["campaign"]["assessment"]["significance"]
-    rows = compared_rows(differences_of(games[0], games[1], same_starts), significance)
-    runs = list(zip((str(before), str(after)), manifests, strict=True))
-    return rows, render_comparison(runs, rows, same_starts=same_starts, significance=significance)
+def compare_runs(folders: Sequence[Path], addresses: Sequence[str]) -> Comparison:
+    """The comparison of run folders, each with the one before it. `addresses` are those of their reports, empty for a
+    run without one.
+
+    Raises UsageError for fewer than two folders, a folder that is no run, one without games, and results that were
+    changed.
+    """
+    if len(folders) < 2:
+        raise UsageError.of("compare", str(folders[0]), "is the only run", "name at least two, in their order")
+    runs = [RunFolder(each) for each in folders]
+    manifests = [each.manifest() for each in runs]
+    games = [episodes_of(each) for each in runs]
+    starts = [_starts(manifest) for manifest in manifests]
+    changes = changed_games(games, starts)
+    compared = [
+        ComparedRun(name=str(folder), label=label, address=address, manifest=manifest)
+        for folder, label, address, manifest in zip(folders, _labels(folders), addresses, manifests, strict=True)
+    ]
+    transitions = []
+    for place, (before, after) in enumerate(pairwise(range(len(runs)))):
+        same_starts = starts[before] == starts[after]
+        significance = manifests[after]["campaign"]["assessment"]["significance"]
+        rows = compared_rows(differences_of(games[before], games[after], same_starts), significance)
+        transitions.append(
+            Transition(
+                before=compared[before],
+                after=compared[after],
+                same_starts=same_starts,
+                significance=significance,
+                rows=rows,
+                changes=changes[place],
+            )
+        )
+    arms = [
+        {each.name: each.arm for each in planned(manifest) if isinstance(each, AssessmentStage)}
+        for manifest in manifests
+    ]
+    found = histories(arms, [failure_rates(each) for each in games])
+    return Comparison(runs=compared, transitions=transitions, histories=found)
 
 
-def _scene(manifest: Mapping[str, Any]) -> dict[str, str]:
+def _labels(folders: Sequence[Path]) -> list[str]:
+    """The folders' names, or their paths where two have the same name."""
+    names = [each.absolute().name for each in folders]
+    return names if len({*names}) == len(names) else [str(each) for each in folders]
+
+
+def _starts(manifest: Mapping[str, Any]) -> tuple[object, ...]:
+    """What the starts of a run's games depend on: the scene's files, and the seed from which they are drawn."""
     scene = posixpath.basename(posixpath.normpath(manifest["campaign"]["scene"]))
-    return {
-        posixpath.basename(name): digest
+    files = sorted(
+        (posixpath.basename(name), digest)
         for name, digest in manifest["hashes"].items()
         if posixpath.basename(posixpath.dirname(name)) == scene
-    }
+    )
+    return (*files, manifest["seeds"][0])

@@ -9,6 +9,7 @@ from typing import Any
 import pandas as pd
 
 from harness.campaign.plan.stages import AssessmentStage, TrainingStage, stage_id
+from harness.campaign.results.drawn_starts import drawn_starts
 from harness.campaign.results.matchups import matchups_of
 from harness.campaign.results.population_rows import by_who_drove
 from harness.campaign.results.read_run import ReadRun
@@ -55,6 +56,8 @@ def evaluated(run: ReadRun) -> RunTables:
         shields=compare_shielded(_arms(run), run.episodes),
         manoeuvres=run.manoeuvres,
         causes=run.causes,
+        takeovers=run.takeovers,
+        starts=drawn_starts(run.scene, run.campaign.start_seed, run.episodes["episode"]),
         realism=found,
         game=_game(run),
         non_ego_drives=_people_drive(run),
@@ -81,7 +84,7 @@ def csv_tables(run: ReadRun, tables: RunTables) -> dict[str, pd.DataFrame]:
     """The tables that the run folder gets, by the names of their files."""
     names = ["episodes", "training", "summary", "comparisons", "causes", "manoeuvres", "realism", "undecided"]
     names += ["attribution"] if run.campaign.attribution is not None else []
-    names += ["reference_drivers", "preventability"] if run.reference_drivers is not None else []
+    names += ["reference_drivers", "takeovers", "preventability"] if run.reference_drivers is not None else []
     names += ["over_trainings"] if len(tables.over_trainings) else []
     names += ["populations"] if run.campaign.population else []
     names += ["reconfiguration"] if is_tuned(run.manifest) else []

@@ -1,8 +1,8 @@
 """What the results of a run were made from, and their checksums: the same results are not made again.
 
 <run>/.stages/results.json holds a key of everything that results depend on (the manifest, the checksums of the stages'
-files, this program and its libraries), the verdicts for the terminal, and the checksums of the manifest and of every
-file of the results, which `RunFolder.result` compares before it is read.
+files and of the pinned games, this program and its libraries), the verdicts for the terminal, and the checksums of the
+manifest and of every file of the results, which `RunFolder.result` compares before it is read.
 It is written last. Where an input has changed, or a file is missing or damaged, the results are made anew: a record of
 earlier results fits neither inputs that have changed nor results that are half made.
 """
@@ -88,4 +88,5 @@ def _results(folder: RunFolder) -> Iterator[Path]:
 def _key(folder: RunFolder, manifest: Mapping[str, Any]) -> str:
     stages = {name: (folder.done(name) or {}).get("files") for name in manifest["stages"]}
     libraries = {name: importlib.metadata.version(name) for name in _DRAWN_WITH}
-    return digest_of([dict(manifest), stages, libraries, digest_of_sources()])
+    pinned = checksums_of(folder.path, folder.pinned_games)
+    return digest_of([dict(manifest), stages, libraries, pinned, digest_of_sources()])

@@ -15,7 +15,7 @@ from harness.campaign.plan.stages import Stage, stage_id
 from harness.campaign.results.shown_work import doing
 from harness.campaign.storage.arm_tables import PLAYED, arm_tables
 from harness.campaign.storage.manifest import planned
-from harness.campaign.storage.run_folder import JUDGED, SELECTED, RunFolder
+from harness.campaign.storage.run_folder import JUDGED, SELECTED, TAKEN_OVER, RunFolder
 from harness.config.campaign import Campaign
 from harness.config.toml_reading import Document
 from harness.drivers.policy_file import policy_files, read_card
@@ -55,6 +55,7 @@ class ReadRun:
     selections: pd.DataFrame
     reference_drivers: pd.DataFrame | None
     """None where no arm's failures are judged."""
+    takeovers: pd.DataFrame
 
     @property
     def done(self) -> set[str]:
@@ -76,7 +77,7 @@ def read_run(folder: RunFolder, console: Console) -> ReadRun:
     selections = joined("selections", _gathered(folder, manifest, "selection", SELECTED))
     made = [*_done(manifest, "training"), *_done(manifest, "selection")]
     policies = {stage: _policy(folder.policy(stage)) for stage in made}
-    judged = list(_gathered(folder, manifest, "preventability", JUDGED))
+    judged, courses = (list(_gathered(folder, manifest, "preventability", table)) for table in (JUDGED, TAKEN_OVER))
     with doing(console, "measuring the games"):
         arms = [arm_tables(folder, stage, scene) for stage in _done(manifest, "assessment")]
     return ReadRun(
@@ -93,6 +94,7 @@ def read_run(folder: RunFolder, console: Console) -> ReadRun:
         reconfiguration=searches,
         selections=selections,
         reference_drivers=joined("reference_drivers", judged) if judged else None,
+        takeovers=joined("takeovers", courses),
     )
 
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from harness.environments.recorded import recorded_game as game_of
+from harness.evaluation.comparisons.preventability import TAKES_OVER
 from harness.evaluation.people import judged, judged_outcomes
 from harness.evaluation.strategies import Arm, counterparts
 from harness.evaluation.trace_file import TraceReader
@@ -20,12 +22,15 @@ from harness.game.sight import TALL_WIDTH_M
 from harness.replay import choose_games
 from harness.replay.contacts import contacts
 from harness.replay.vehicles import DrawnVehicle, presences, types_of_vehicles
-from harness.reports.embedding import BACKGROUND_COLUMNS, COLUMNS, GameTracks, Track
+from harness.reports.embedding import BACKGROUND_COLUMNS, COLUMNS, REFERENCE_COLUMNS, GameTracks, Reference, Track
 from harness.reports.failing_paths import MOST_PATHS, SPAN_S, FailingPath
 from harness.road.net.network import read_net
 from harness.road.scene import drawing
 from harness.road.scene.open_scene import OpenScene
 
+Takeovers = Mapping[tuple[str, int, int], pd.DataFrame]
+"""The rows of `takeovers.csv` by arm, seed and episode."""
+_GAME = ["arm", "seed", "episode"]
 TAKE_TURNS = 20  # games of an arm and seed in turn, so that a page without room for all has some of each
 
 
@@ -35,19 +40,20 @@ def recorded_games(
     traces: Callable[[str, int], Path],
     scene: OpenScene,
     examples: Sequence[tuple[str, int, int]] = (),
+    takeovers: Takeovers = MappingProxyType({}),
 ) -> Iterator[GameTracks]:
     """Every played game, those to watch first at the front. Each is read when the iterator reaches it.
 
     Games with a replay come first, worst first, in turns of `TAKE_TURNS` per arm and seed. Each is followed by the game
     of the same episode that it is compared with; then the rest. `arms` are the arms by name; `traces` gives the traces
     file of an arm and seed. `examples`: arm, seed and episode of games that the page refers to, which come before all
-    others.
+    others. `takeovers`: the courses of reference drivers.
     """
     reader = TraceReader()
     for game in watching_order(episodes, arms, examples).itertuples():
         trace = reader.read(traces(game.arm, game.seed), game.episode)
         if not trace.empty:
-            yield tracks_of(trace, scene, game)
+            yield tracks_of(trace, scene, game, takeovers.get((game.arm, game.seed, game.episode)))
 
 
 def failing_paths(
@@ -100,8 +106,13 @@ def watching_order(
     return played.loc[list(order)]
 
 
-def tracks_of(trace: pd.DataFrame, scene: OpenScene, game: Any) -> GameTracks:
-    """One game's trace as tracks; `game` is its row of `episodes`."""
+def takeovers_of(table: pd.DataFrame) -> Takeovers:
+    """The table by game."""
+    return {(str(arm), int(seed), int(episode)): rows for (arm, seed, episode), rows in table.groupby(_GAME)}
+
+
+def tracks_of(trace: pd.DataFrame, scene: OpenScene, game: Any, takeover: pd.DataFrame | None = None) -> GameTracks:
+    """One game's trace as tracks; `game` is its row of `episodes`, `takeover` the course of a reference driver."""
     types = types_of_vehicles(trace, scene.route_files, scene.obstacles)
     recorded = game_of(trace, scene)
     measures = {name: getattr(recorded.quantities, name) for name in ("leader_gap_m", "time_to_collision_s")}
@@ -132,8 +143,18 @@ def tracks_of(trace: pd.DataFrame, scene: OpenScene, game: Any) -> GameTracks:
             for name, rows in by_name.items()
             for piece in presences(rows)
         ],
+        reference=None if takeover is None else _reference(takeover, types),
         touches=[(contact.time_s, contact.x_m, contact.y_m) for contact in contacts(trace, types, scene.rail_lines)],
     )
+
+
+def _reference(takeover: pd.DataFrame, types: Mapping[str, DrawnVehicle]) -> Reference:
+    shown = list(COLUMNS)[:REFERENCE_COLUMNS]
+    tracks = [
+        _track(str(role), rows.sort_values("step"), types[str(role)], shown)
+        for role, rows in takeover.groupby("player", sort=False)
+    ]
+    return Reference(driver=TAKES_OVER[takeover["driver"].iloc[0]], players=tracks)
 
 
 def _track(name: str, rows: pd.DataFrame, drawn: DrawnVehicle, columns: Sequence[str]) -> Track:

@@ -2,34 +2,28 @@
 
 from __future__ import annotations
 
-import shutil
 from dataclasses import replace
 
-import pandas as pd
 from rich.console import Console
 
 from harness.campaign.results.ci_files import write_ci_files
+from harness.campaign.results.drawn_starts import found_boundaries
 from harness.campaign.results.evaluate_run import csv_tables, evaluated
 from harness.campaign.results.kept_results import RunResult, keep_result
 from harness.campaign.results.model_cards import write_model_cards
 from harness.campaign.results.read_run import read_run
-from harness.campaign.results.recorded_games import failing_paths, recorded_games, scene_drawing
-from harness.campaign.results.replay_game import read_game
+from harness.campaign.results.recorded_games import failing_paths, recorded_games, scene_drawing, takeovers_of
 from harness.campaign.results.shown_result import shown_result, verdicts_of
-from harness.campaign.results.shown_work import doing, progress_bar, say
+from harness.campaign.results.shown_work import doing
+from harness.campaign.results.write_replays import write_replays
 from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.run_log import LOGGER
 from harness.evaluation.comparisons.attribution import examples
+from harness.evaluation.comparisons.preventability import prevented_examples
 from harness.evaluation.tables import write_csv
-from harness.evaluation.trace_file import TraceReader
-from harness.evaluation.worst_first import worst_first
 from harness.files import write_atomically
-from harness.replay import choose_games
 from harness.reports.page import render_page
 from harness.reports.provenance import mixed_versions, warn
-from harness.road.scene.open_scene import OpenScene
-
-WRITING_REPLAYS = "writing replays"
 
 
 def write_results(folder: RunFolder, console: Console) -> RunResult:
@@ -39,11 +33,15 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     for name, table in csv_tables(run, tables).items():
         write_csv(table, folder.path / f"{name}.csv")
     write_model_cards(folder, tables.manifest, run.policies, tables.summary, tables.realism)
-    tables = replace(tables, replays=_write_replays(folder, run.scene, tables.of_own_traits(tables.episodes), console))
+    tables = replace(
+        tables,
+        replays=write_replays(folder, run.scene, tables.of_own_traits(tables.episodes), console),
+        boundaries=found_boundaries(folder, run.scene),
+    )
     with doing(console, "writing the report"):
-        games = recorded_games(
-            tables.episodes, tables.arms, folder.traces_of_arm, run.scene, examples(tables.attribution)
-        )
+        prevented = [(*arm, episode) for arm, episode in prevented_examples(tables.takeovers).items()]
+        shown_first, takeovers = [*examples(tables.attribution), *prevented], takeovers_of(tables.takeovers)
+        games = recorded_games(tables.episodes, tables.arms, folder.traces_of_arm, run.scene, shown_first, takeovers)
         paths = list(failing_paths(tables.episodes, tables.arms, folder.traces_of_arm, run.scene))
         page = render_page(tables, games, scene_drawing(run.scene), paths)
     write_atomically(folder.path / "report.html", page.encode())
@@ -54,21 +52,3 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     keep_result(folder, run.manifest, result)
     LOGGER.info("wrote the results of %d games; exit code %d", len(tables.episodes), result.exit_code)
     return result
-
-
-def _write_replays(folder: RunFolder, scene: OpenScene, episodes: pd.DataFrame, console: Console) -> list[str]:
-    """Write the replays of the games to watch first, remove all others, and return their names."""
-    folder.replays.mkdir(exist_ok=True)
-    names, reader = [], TraceReader()
-    say(console, WRITING_REPLAYS)
-    chosen = worst_first(choose_games(episodes))
-    with progress_bar(WRITING_REPLAYS, console) as on_progress:
-        for done, row in enumerate(chosen.itertuples(), start=1):
-            game = read_game(row, folder.traces_of_arm(row.arm, row.seed), reader, scene)
-            game.write_replay(folder.replays / game.name)
-            names.append(game.name)
-            on_progress(done, len(chosen))
-    for old in folder.replays.iterdir():
-        if old.is_dir() and old.name not in names:
-            shutil.rmtree(old)
-    return names

@@ -5,8 +5,9 @@ from __future__ import annotations
 import csv
 import json
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from datetime import datetime
+from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
@@ -28,11 +29,12 @@ def runs_in(folder: Path) -> list[IndexedRun]:
     """The runs whose folders are in this one, those of the latest date first. Raises UsageError if it is no folder."""
     if not folder.is_dir():
         raise UsageError.of(folder, "", "is not a folder", "name the folder that the run folders are in")
-    found = [_indexed(file.parent) for file in sorted(folder.glob(f"*/{MANIFEST}"))]
+    found = [indexed_run(file.parent) for file in sorted(folder.glob(f"*/{MANIFEST}"))]
     return sorted(sorted(found, key=lambda run: run.name), key=lambda run: run.finished_on, reverse=True)
 
 
-def _indexed(path: Path) -> IndexedRun:
+def indexed_run(path: Path) -> IndexedRun:
+    """A run as the index has it."""
     try:
         return _read(RunFolder(path))
     except (HarnessError, OSError, ValueError, KeyError) as error:
@@ -113,6 +115,17 @@ def _last_events(begun: Sequence[re.Match[str]]) -> dict[str, bool]:
     return {each["stage"]: each["what"] != "started" for each in begun}
 
 
+def begun_once(path: Path) -> dict[str, datetime]:
+    """When each stage of a run began that goes on, by its log; without those that were interrupted before."""
+    begun = _log_of(path / LOG)
+    counts = Counter(each["stage"] for each in begun)
+    return {each["stage"]: _time_of(each) for each in begun if counts[each["stage"]] == 1}
+
+
+def _time_of(line: re.Match[str]) -> datetime:
+    return datetime.strptime(line["time"], "%Y-%m-%dT%H:%M:%SZ").replace(tzinfo=timezone.utc)
+
+
 def _left_s(entries: Mapping[str, Mapping[str, Any]], begun: Sequence[re.Match[str]]) -> float | None:
     """The time left: the mean duration of the done stages of each kind for each that is not done, at the pace at which
     stages were carried out beside one another."""
@@ -135,7 +148,7 @@ def _durations_s(begun: Sequence[re.Match[str]]) -> Iterator[float]:
     running: set[str] = set()
     before: datetime | None = None
     for each in begun:
-        now = datetime.strptime(each["time"], "%Y-%m-%dT%H:%M:%SZ")
+        now = _time_of(each)
         if before is not None and running:
             yield (now - before).total_seconds()
         before = now

@@ -14,9 +14,9 @@ from urllib.parse import unquote
 import pandas as pd
 
 from harness.campaign.results.read_run import episodes_of
-from harness.campaign.results.recorded_games import tracks_of
+from harness.campaign.results.recorded_games import takeovers_of, tracks_of
 from harness.campaign.results.replay_game import read_trace, traces_of
-from harness.campaign.storage.run_folder import RunFolder
+from harness.campaign.storage.run_folder import TAKEN_OVER, RunFolder
 from harness.errors import UsageError
 from harness.evaluation.people import judged
 from harness.evaluation.tables import read_csv
@@ -49,6 +49,8 @@ class ServedReport:
         episodes = episodes_of(folder)
         self._marks = marks_of(read_csv(folder.result("manoeuvres.csv")))
         self._causes = causes_by_game(read_csv(folder.result("causes.csv")))
+        judged = (folder.path / TAKEN_OVER).is_file()
+        self._takeovers = takeovers_of(read_csv(folder.result(TAKEN_OVER))) if judged else {}
         self._scene = open_scene(folder.scene)
         played = worst_first(episodes[(episodes["error"] == "") & (episodes["ego_outcome"] != "error")])
         rows: list[Any] = list(played.itertuples())
@@ -68,7 +70,8 @@ class ServedReport:
         with self._lock:  # the reader keeps one file open
             traces = traces_of(self._folder, game.arm, game.seed, game.episode)
             trace = read_trace(traces, game.episode, self._reader)
-        return game_text(tracks_of(trace, self._scene, game), self._marks, self._causes, self._crowds).encode()
+        tracks = tracks_of(trace, self._scene, game, self._takeovers.get((game.arm, game.seed, game.episode)))
+        return game_text(tracks, self._marks, self._causes, self._crowds).encode()
 
 
 def _entry(game: Any) -> list[Any]:

@@ -5,6 +5,7 @@
                              of a reconfiguration: driver.toml
     traces/<stage>.parquet   one file per arm
     scene/                   a copy of the scene's files
+    pinned/<game>.toml       failures that `harness minimise` pinned, with what they need to be played again
     harness.log              what the commands did, and when
     .stages/<stage>/         what a stage needs to go on, or to be skipped: checkpoint, trials, segments, tables,
                              done.json
@@ -37,8 +38,8 @@ from harness.errors import Problem, UsageError
 from harness.files import content_of, drop_scratch, has_digest, leads_out, make_folder, write_atomically
 
 MANIFEST = "manifest.json"
-JUDGED, SELECTED = "reference_drivers.csv", "selections.csv"
-"""The tables that the judgement of an arm's failures, and a selection, make."""
+JUDGED, TAKEN_OVER, SELECTED = "reference_drivers.csv", "takeovers.csv", "selections.csv"
+"""The tables that the judgement of an arm's failures makes, of verdicts and of courses, and that of a selection."""
 _PATIENCE_S = 10.0  # the time that workers of a killed command may take to end
 _MOST_MANIFEST_BYTES = 50_000_000
 _RUN = "run the campaign again"
@@ -75,6 +76,15 @@ class RunFolder:
     @property
     def replays(self) -> Path:
         return self.path / "replays"
+
+    @property
+    def pinned(self) -> Path:
+        """Where `harness minimise` writes pinned games, unless it is told another folder."""
+        return self.path / "pinned"
+
+    @property
+    def pinned_games(self) -> list[Path]:
+        return sorted(self.pinned.glob("*.toml"))
 
     def policy(self, stage: str) -> Path:
         return self.path / "policies" / stage

@@ -31,6 +31,8 @@ _VERDICTS = {
 """The verdicts in preventability.csv, each with its column of reference_drivers.csv."""
 _WORDS = {REGULATION: "careful and competent driver", "fuzzy": "fuzzy safety model", "rss": "RSS"}
 """Reference drivers in prose."""
+TAKES_OVER = _WORDS | {"rss": "RSS driver", UPPER_BOUND: "driver that brakes fully"}
+"""Reference drivers that take over a game, after "the"."""
 
 
 def count_prevented(games: pd.DataFrame, episodes: pd.DataFrame) -> pd.DataFrame:
@@ -65,6 +67,14 @@ def _verdicts(games: pd.DataFrame, episodes: int) -> dict[str, float]:
 def by_regulation(counts: pd.DataFrame, arm: str) -> list[Mapping[Any, Any]]:
     """The rows of preventability.csv on the driver of the regulation in an arm, one for each training seed."""
     return counts[(counts["arm"] == arm) & (counts["driver"] == REGULATION)].to_dict("records")
+
+
+def prevented_examples(takeovers: pd.DataFrame) -> dict[tuple[str, int], int]:
+    """An episode of each arm and training seed in which a reference driver prevents the collision from the conflict on,
+    the driver of the regulation if it prevents one. `takeovers` is the table of this name."""
+    first = takeovers.assign(other=takeovers["driver"] != REGULATION).sort_values(["other", "episode"], kind="stable")
+    rows = first.drop_duplicates(["arm", "seed"]).sort_index()
+    return {(str(row.arm), int(row.seed)): int(row.episode) for row in rows.itertuples()}
 
 
 def sentences_of(counts: pd.DataFrame, games: pd.DataFrame, arm: str) -> dict[int, list[str]]:

@@ -43,7 +43,7 @@ def report(run: Path) -> object:
 
 
 READERS: dict[str, Callable[[Path], object]] = {
-    "compare": lambda run: compare_runs(run, run),
+    "compare": lambda run: compare_runs([run, run], ["", ""]),
     "replay --list": lambda run: game_table(run, GameList()),
     "replay": lambda run: played_game(run, "naive_alone", 0, None),
     "serve": lambda run: ServedReport(RunFolder(run)),
@@ -138,3 +138,6 @@ def test_compare__published_folders_are_read_and_said_to_be_unchecked(run: Path)
     assert done.returncode == 0, done.stderr
     assert f"{run}: has no checksums, as published; whether its files were changed is not known" in done.stdout
     assert f"{untrained_run()}: has no" not in done.stdout
+    assert "naive ego" in done.stdout
+    alone = harness("compare", run)
+    assert (alone.returncode, "name at least two" in alone.stderr) == (2, True)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import time
 import urllib.error
 from collections.abc import Iterator
+from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
 import pytest
@@ -15,11 +17,13 @@ from harness.campaign.results.run_index import runs_in
 from harness.campaign.results.served_runs import ServedRuns
 from harness.campaign.storage.locks import only_one
 from harness.campaign.storage.run_folder import RunFolder
+from harness.campaign.storage.training_curves import CHECKPOINT
 from harness.errors import UsageError
 from harness.reports.index_page import render_index
+from tests.support.pages import Page
 from tests.support.repository import REPOSITORY
 from tests.support.serving import read, serving
-from tests.support.tiny import harness, sumo_run
+from tests.support.tiny import harness, learned_run, sumo_run
 
 pytestmark = pytest.mark.slow
 
@@ -116,7 +120,44 @@ def test_serve__of_a_folder_has_an_index_every_report_with_its_games_and_compari
     arm, _, seed, episode, *_ = json.loads(report.split('id="elsewhere">')[1].split("</script>")[0])[0]
     assert json.loads(read(f"{address}/first/games/{arm},{seed},{episode}.json"))["arm"] == arm
     assert "no difference" in read(f"{address}/compare/second/first")
+    assert "Comparison of 3 runs" in read(f"{address}/compare/second/first/second")
     assert 'href="/second/"' not in read(f"{address}/?search=first")
+
+
+def test_serve__a_run_that_has_not_ended_has_a_page_of_its_progress(tmp_path: Path) -> None:
+    """The naive ego is trained: it has a checkpoint after half of its steps, 20 s after it began."""
+    run = RunFolder(shutil.copytree(learned_run(), tmp_path / "going_on"))
+    manifest = json.loads(run.manifest_file.read_bytes())
+    for name, entry in manifest["stages"].items():
+        manifest["stages"][name] = {key: entry[key] for key in ("kind", "name", "seed")} | {
+            "status": "pending",
+            "message": "",
+        }
+    run.write_manifest(manifest)
+    run.results.unlink()
+    (run.path / "summary.csv").unlink()
+    begun = datetime.now(timezone.utc) - timedelta(seconds=30)
+    (run.path / "harness.log").write_text(f"{begun:%Y-%m-%dT%H:%M:%SZ} INFO    started  naive-seed1\n")
+    for table in run.path.glob(".stages/*/training.csv"):
+        table.unlink()
+    made = begun.timestamp() + 20.0
+    os.utime(run.work("naive-seed1") / CHECKPOINT, (made, made))
+    with serving(ServedRuns(tmp_path).answer) as server:
+        address = f"http://127.0.0.1:{server.server_port}"
+        with only_one(run.lock):
+            page = read(f"{address}/going_on/")
+            assert 'href="/going_on/"' in read(f"{address}/")
+        stopped = read(f"{address}/going_on/")
+    cells = [cell["text"] for cell in Page(page).tables["running"][1]]
+    assert cells[:2] == ["naive-seed1", "training"]
+    assert 30.0 <= float(cells[2].removesuffix(" s")) < 60.0
+    steps, budget = (int(part.replace(",", "")) for part in cells[3].split(" of "))
+    assert 0 < steps <= budget
+    assert cells[4].endswith(" s")
+    assert "Learning curve of naive: mean payoff and failure rate" in page
+    assert "brought up to date every" in page
+    assert "Interrupted after 0 of" in stopped
+    assert "it goes on where it stopped" in stopped
 
 
 @pytest.mark.parametrize(

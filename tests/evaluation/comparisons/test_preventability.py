@@ -9,7 +9,13 @@ import pytest
 from scipy import stats
 
 from harness.evaluation.columns import TABLES
-from harness.evaluation.comparisons.preventability import REGULATION, by_regulation, count_prevented, sentences_of
+from harness.evaluation.comparisons.preventability import (
+    REGULATION,
+    by_regulation,
+    count_prevented,
+    prevented_examples,
+    sentences_of,
+)
 from harness.evaluation.tables import table_of, typed
 
 ARM = {"arm": "naive_vs_speedy", "persona": "speedy", "seed": 1}
@@ -94,3 +100,15 @@ def test_sentences__name_the_driver_of_the_regulation_and_say_both_verdicts_apar
     (row,) = by_regulation(table, "naive_vs_speedy")
     assert row["from_start_rate"] == pytest.approx(0.2)
     assert sentences_of(table, GAMES, "retrained_vs_speedy") == {}
+
+
+def test_examples__are_of_the_driver_of_the_regulation_where_it_prevents_any() -> None:
+    games = [(1, 4, "rss"), (1, 7, REGULATION), (1, 9, REGULATION), (2, 5, "fuzzy"), (2, 6, "rss")]
+    cells = {"arm": "naive_vs_speedy", "player": "ego", "x_m": 0.0, "y_m": 0.0, "heading_rad": 0.0}
+    rows = [
+        {**cells, "seed": seed, "episode": episode, "driver": driver, "step": step}
+        for seed, episode, driver in games
+        for step in (8, 9)
+    ]
+    assert prevented_examples(table_of("takeovers", rows)) == {("naive_vs_speedy", 1): 7, ("naive_vs_speedy", 2): 5}
+    assert prevented_examples(table_of("takeovers")) == {}
