@@ -30,6 +30,7 @@ SECTIONS = {
         "map-files",
         "environments",
         "report",
+        "many-runs",
         "acceptance",
         "regression",
         "export",
