@@ -16,7 +16,7 @@ import typer
 from harness.cli import messages
 from harness.cli.documents import check, check_driver, columns, new, persona_app, policy_app, schema
 from harness.cli.falsifying import falsify
-from harness.cli.league import league
+from harness.cli.league import league, league_table
 from harness.cli.output import (
     AllowCode,
     AsJson,
@@ -184,7 +184,7 @@ def report(run: RunPath, as_json: AsJson = False, quiet: Quiet = False, verbose:
 
 
 _OF_RUNS = (replay, export, runs, serve, compare, realism, minimise, falsify)
-for command in (league, *_OF_RUNS, new, check, check_driver, regression, schema, columns):
+for command in (league, league_table, *_OF_RUNS, new, check, check_driver, regression, schema, columns):
     app.command()(command)
 for name, group in (("persona", persona_app), ("policy", policy_app), ("scene", scene_app)):
     app.add_typer(group, name=name)

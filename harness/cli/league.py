@@ -65,3 +65,25 @@ def league(
             print_plain(outcome.failed, console, "red")
         if outcome.exit_code:
             raise typer.Exit(outcome.exit_code)
+
+
+def league_table(
+    folder: Annotated[Path, typer.Argument(metavar="[FOLDER]", help="The folder that the leagues are in.")] = Path(
+        "reports"
+    ),
+    as_json: AsJson = False,
+) -> None:
+    """Rank the egos of all leagues in a folder by the games that all of them played.
+
+    Egos that can't be told apart share a rank: a rank is 1 and the number of egos that fail significantly less often
+    (McNemar's exact test in the same games, Holm's correction). Writes league_ranks.csv into the folder.
+    """
+    with output(as_json) as console:
+        from harness.campaign.results.league_egos import rank_leagues
+        from harness.reports.league_page import ranks_terminal
+
+        ranks, file = rank_leagues(folder)
+        console.print(ranks_terminal(ranks))
+        print_plain([str(file)], console)
+        if as_json:
+            print_json({"ranks": ranks.to_dict("records")})

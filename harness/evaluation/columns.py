@@ -21,8 +21,9 @@ from harness.evaluation.column import (
     Column,
     rate,
 )
+from harness.evaluation.equilibria_columns import EQUILIBRIA
 from harness.evaluation.falsification_columns import FALSIFICATION, SEARCHES
-from harness.evaluation.league_columns import LEAGUE_MEASURES, LEAGUE_PAIRING
+from harness.evaluation.league_columns import LEAGUE_MEASURES, LEAGUE_PAIRING, LEAGUE_RANKS
 from harness.evaluation.measured_game import METRICS_OF_CONDUCT, METRICS_OF_GAMES, METRICS_OF_PLAYERS
 from harness.evaluation.over_trainings_columns import OVER_TRAININGS
 from harness.evaluation.preventability_columns import PREVENTABILITY, REFERENCE_DRIVERS, TAKEOVERS
@@ -291,34 +292,7 @@ _TABLES = {
         *Column("non_ego_payoff", NUMBER, "Mean payoff of the non-ego.").with_interval(_T),
         Column("ego_mean_speed_mps", NUMBER, "Mean over the games of the ego's mean speed."),
     ),
-    "equilibria": (
-        SEED,
-        Column("game", TEXT, "The persona of the non-egos, or `all`: every non-ego, of any persona or none."),
-        Column("solution", TEXT, "`nash`, `safest` (game `all` only), or why there is none."),
-        Column("number", MAYBE, "Of the equilibrium within seed and game, from 1, the one to choose first."),
-        Column("role", TEXT, "`ego` or `non_ego`."),
-        Column("player", TEXT, "The strategy."),
-        Column("share", NUMBER, "How often its role plays it; empty for the non-egos of `safest`.", unit=SHARE),
-        Column("payoff", NUMBER, "Of this strategy against the other side's shares (nash)."),
-        Column("solution_payoff", NUMBER, "Of its role in this solution (nash)."),
-        Column("regret", NUMBER, "The possible gain of its role by another strategy of the table (nash)."),
-        Column(
-            "failure_rate", NUMBER, "Of the ego against the other side's shares; safest: its worst case.", unit=SHARE
-        ),
-        Column(
-            "solution_failure_rate", NUMBER, "Of the ego in this solution; safest: the mixture's worst.", unit=SHARE
-        ),
-        Column(
-            "held_out_failure_rate",
-            NUMBER,
-            "The same by 10-fold cross-validation over the episodes (nash: number 1 only).",
-            unit=SHARE,
-        ),
-        Column(
-            "dominated_in_payoff", TEXT, "The strategy or mixture of its role that strictly dominates it; empty: none."
-        ),
-        Column("dominated_in_failures", TEXT, "The same for an ego's failure rates."),
-    ),
+    "equilibria": (SEED, *EQUILIBRIA),
     "generalisation": (
         SEED,
         Column("ego", TEXT, "The retrained ego."),
@@ -339,6 +313,7 @@ _TABLES = {
     "reference_drivers": (*_GAME, _outcome("ego", "ego"), *REFERENCE_DRIVERS),
     "takeovers": (ARM, SEED, EPISODE, *TAKEOVERS),
     "preventability": (ARM, PERSONA, SEED, *PREVENTABILITY),
+    "league_ranks": LEAGUE_RANKS,
     "league": (*LEAGUE_PAIRING, SEED, ARM, _EPISODES, *LEAGUE_MEASURES),
 }
 TABLES: Mapping[str, Mapping[str, Column]] = {

@@ -31,3 +31,11 @@ LEAGUE_MEASURES = (
     Column("mean_speed_mps", NUMBER, "Mean over the games of the ego's average speed."),
     *rate("hard_brake_rate", "Share of the games in which the ego brakes hard (`hard_brake` in docs/manoeuvres.md)."),
 )
+LEAGUE_RANKS = (
+    Column("rank", COUNT, "1, and the number of egos that fail significantly less often in the same games."),
+    Column("ego", TEXT, "The ego."),
+    Column("games", COUNT, "Games that every ego of the table played."),
+    Column("games_left_out", COUNT, "Other games of this ego."),
+    *rate("failure_rate", "Share of these games in which the ego failed."),
+    Column("told_apart", TEXT, "The egos with significantly more or fewer failures, joined by ` + `: McNemar, Holm."),
+)

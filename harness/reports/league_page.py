@@ -63,6 +63,20 @@ def league_terminal(table: pd.DataFrame, most: int = 12) -> Table:
     return shown
 
 
+def ranks_terminal(ranks: pd.DataFrame) -> Table:
+    """The table `league_ranks` for the terminal."""
+    from rich.table import Table
+
+    shown = Table(box=None, pad_edge=False)
+    for heading in ("rank", "ego", "failures", "95 %", "told apart from"):
+        shown.add_column(heading, overflow="fold")
+    for row in ranks.to_dict("records"):
+        span = interval(row["failure_rate_low"], row["failure_rate_high"])
+        rate = f"{percent(row['failure_rate'])} of {row['games']}"
+        shown.add_row(str(row["rank"]), row["ego"], rate, span, row["told_apart"].replace(" + ", ", ") or "nobody")
+    return shown
+
+
 def sentence_of(row: Mapping[Any, Any]) -> str:
     """What a row of the table says, in a sentence."""
     low, high = row["failure_rate_low"], row["failure_rate_high"]

@@ -19,6 +19,7 @@ RISK_TONES = {
     "unknown": "no collision, or not known",
 }
 """The colours of failures: the probability of a serious injury (MAIS3+) in a collision, by its upper bound."""
+_ROUNDING = 1e-9
 _RISK = "the probability of a serious injury (MAIS3+)"
 
 
@@ -42,10 +43,11 @@ def severity_clause(ego: str, rows: Sequence[Row]) -> str:
 
 
 def risk_tone(risk: float) -> str:
-    """The key of `RISK_TONES` of an upper bound of the probability in a failure; NaN: it is not known."""
+    """The key of `RISK_TONES` of an upper bound of the probability in a failure; NaN: it is not known. A mean of equal
+    bounds may be above them in its last bits."""
     if not np.isfinite(risk):
         return "unknown"
-    return "small" if risk <= 0.01 else "medium" if risk <= 0.1 else "severe"
+    return "small" if risk <= 0.01 + _ROUNDING else "medium" if risk <= 0.1 + _ROUNDING else "severe"
 
 
 def _risk(rows: Sequence[Row]) -> str:

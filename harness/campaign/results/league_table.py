@@ -85,6 +85,11 @@ def write_league(ego: str, folder: Path, results: Mapping[str, RunResult]) -> Le
     return LeagueResult(table=table, failed=failed, exit_code=exit_code, record=record)
 
 
+def person_of(arm: str, persona: str) -> str:
+    """The cell `person` of an arm."""
+    return _PLACED.get(arm, persona)
+
+
 def _in_json(cell: Any) -> Any:
     """A cell as JSON has it: null where it is empty."""
     return None if pd.isna(cell) else cell
@@ -112,7 +117,7 @@ def _rows(ego: str, run: RunFolder, games: dict[tuple[str, str, int], str]) -> I
     page = (run.path / "report.html").read_text(encoding="utf-8")
     for row in summary.to_dict("records"):
         arm, seed = row["arm"], row["seed"]
-        person = _PLACED.get(arm, row["persona"])
+        person = person_of(arm, row["persona"])
         if row["failure_rate"] != row["failure_rate"] and not row["errors"]:
             continue  # a persona alone
         of_arm = episodes[(episodes["arm"] == arm) & (episodes["seed"] == seed)]

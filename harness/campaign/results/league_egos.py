@@ -1,0 +1,53 @@
+"""The egos of several leagues, ranked by the games that all of them played."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pandas as pd
+
+from harness.campaign.results.league_table import person_of
+from harness.campaign.storage.run_folder import MANIFEST, RunFolder
+from harness.errors import UsageError
+from harness.evaluation.comparisons.tied_ranks import GAME, league_ranks
+from harness.evaluation.tables import read_csv, write_csv
+from harness.reports.provenance import scene_of
+
+LEAGUE = "league.csv"
+RANKS = "league_ranks.csv"
+SIGNIFICANCE = 0.01
+
+
+def rank_leagues(folder: Path) -> tuple[pd.DataFrame, Path]:
+    """Rank the egos of the leagues in a folder, and write the table `league_ranks` there: the table, and its file.
+
+    Raises UsageError if the folder has fewer than two leagues, or if no game was played by all of their egos.
+    """
+    leagues = sorted(file.parent for file in folder.glob(f"*/{LEAGUE}"))
+    if len(leagues) < 2:
+        found = ", ".join(each.name for each in leagues) or "none"
+        raise UsageError.of(folder, "", f"has fewer than two leagues: {found}", "play some: harness league --ego EGO")
+    games = pd.concat([frame for league in leagues for frame in _games_of(league)], ignore_index=True)
+    table = league_ranks(games, SIGNIFICANCE)
+    if not table["games"].any():
+        remedy = "play the same scenes: harness league --scenes"
+        raise UsageError.of(folder, "", "no game was played by the egos of all leagues", remedy)
+    write_csv(table, folder / RANKS)
+    return table, folder / RANKS
+
+
+def _games_of(league: Path) -> Iterator[pd.DataFrame]:
+    """The games of the scenes of a league, as `league_ranks` reads them: each game alone or beside SUMO's driver once,
+    though it is played for people of every training seed."""
+    ego = str(read_csv(league / LEAGUE)["ego"].iloc[0])
+    found = []
+    for file in sorted(league.glob(f"*/{MANIFEST}")):
+        run = RunFolder(file.parent)
+        episodes = read_csv(run.path / "episodes.csv")
+        played = episodes[(episodes["error"] == "") & episodes["ego_failed"].notna()]
+        people = [person_of(arm, persona) for arm, persona in zip(played["arm"], played["persona"], strict=True)]
+        named = played.assign(scene=scene_of(run.manifest()), person=people, ego=ego)
+        found.append(named.assign(seed=named["seed"].where(named["persona"] != "", 0)))
+    games = pd.concat(found, ignore_index=True)
+    yield games.drop_duplicates(GAME)[[*GAME, "ego", "ego_failed"]]

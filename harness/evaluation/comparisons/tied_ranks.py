@@ -1,0 +1,46 @@
+"""Ranks of egos that played the same games: egos that can't be told apart share a rank."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+import pandas as pd
+
+from harness.evaluation.comparisons.comparison import holm, mcnemar, rate_cells
+from harness.evaluation.tables import table_of
+
+GAME = ["scene", "person", "seed", "episode"]
+"""What names a game that several egos play."""
+
+
+def league_ranks(games: pd.DataFrame, significance: float) -> pd.DataFrame:
+    """A row for each ego, best first, the table `league_ranks`.
+
+    `games` has the columns `GAME`, `ego` and `ego_failed`. Only games count that every ego played. Each two egos are
+    compared by McNemar's exact test of their failures, two-sided, with Holm's correction over all pairs. The rank of an
+    ego is 1 and the number of egos that fail significantly less often: so egos of one rank may still differ, and no ego
+    is before another by chance.
+
+    Raises ValueError when an ego has two games of one name.
+    """
+    failed = games.pivot(index=GAME, columns="ego", values="ego_failed").astype(float)
+    common = failed.dropna()
+    egos = list(common.columns)
+    pairs = list(combinations(range(len(egos)), 2))
+    values = common.to_numpy()
+    p_values = np.array([mcnemar(values[:, a] - values[:, b], "two-sided") for a, b in pairs])
+    better = np.zeros((len(egos), len(egos)), dtype=bool)
+    for (a, b), p_holm in zip(pairs, holm(p_values) if pairs else [], strict=True):
+        if p_holm < significance:
+            a_fails_less = values[:, a].sum() < values[:, b].sum()
+            better[(a, b) if a_fails_less else (b, a)] = True
+    rows = [
+        {"ego": ego, "rank": 1 + int(better[:, place].sum()), "games": len(common)}
+        | {"games_left_out": int(failed[ego].notna().sum()) - len(common)}
+        | rate_cells("failure_rate", values[:, place].sum(), len(common))
+        | {"told_apart": " + ".join(egos[other] for other in np.flatnonzero(better[:, place] | better[place]))}
+        for place, ego in enumerate(egos)
+    ]
+    ranked = sorted(rows, key=lambda row: (row["rank"], row["failure_rate"], row["ego"]))
+    return table_of("league_ranks", ranked)
