@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,8 @@ from onnx import TensorProto, helper
 from typer.testing import CliRunner
 
 from harness.cli.app import app
-from harness.evaluation.tables import read_csv
+from harness.errors import UsageError
+from harness.evaluation.tables import read_csv, write_csv
 from harness.game.observation_layout import SIZE
 
 EPISODES = 3
@@ -95,3 +97,22 @@ def test_files_for_ci__have_each_pairing(league: Path) -> None:
     junit = (league / "junit.xml").read_text(encoding="utf-8")
     assert 'tests="6"' in junit
     assert "The ego fails in 3 of 3 games against nobody in zebra: 100" in junit
+
+
+def test_table__the_same_ego_by_another_name_shares_the_rank(league: Path, tmp_path: Path) -> None:
+    for name in ("brake", "twin"):
+        shutil.copytree(league, tmp_path / name, ignore=shutil.ignore_patterns("traces", "replays", "tensorboard"))
+    write_csv(read_csv(league / "league.csv").assign(ego="twin"), tmp_path / "twin" / "league.csv")
+    done = CliRunner().invoke(app, ["league-table", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    ranks = read_csv(tmp_path / "league_ranks.csv")
+    assert ranks["ego"].tolist() == ["brake", "twin"]
+    assert ranks["rank"].tolist() == [1, 1]
+    assert set(ranks["games"]) == {EPISODES * len(rows(league))}
+    assert ranks["told_apart"].tolist() == ["", ""]
+
+
+def test_table__one_league_is_no_table(league: Path) -> None:
+    done = CliRunner().invoke(app, ["league-table", str(league.parent)])
+    assert isinstance(done.exception, UsageError)
+    assert "has fewer than two leagues: out" in str(done.exception)
