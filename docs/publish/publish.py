@@ -39,6 +39,8 @@ class Step(Document):
     """Whether the long tables of the campaign's run folder are published, compressed."""
     copy_from: str = Field("", alias="copy")
     to: str = ""
+    without: list[str] = Field(default_factory=list)
+    """Names that are not copied, such as `retrained_*`."""
     command: str = ""
     cost: str = ""
     """The cost of a command, in words."""
@@ -49,6 +51,8 @@ class Step(Document):
             raise ValueError("a step has one of `campaign`, `copy` and `command`")
         if bool(self.copy_from) != bool(self.to):
             raise ValueError("`copy` and `to` belong together")
+        if self.without and not self.copy_from:
+            raise ValueError("`without` belongs to `copy`")
         if self.pack and not self.campaign:
             raise ValueError("`pack` belongs to a campaign")
         return self
@@ -102,7 +106,7 @@ def carry_out(step: Step, root: Path) -> None:
         if source.is_dir():
             fresh = target.with_name(f"{target.name}.new")
             shutil.rmtree(fresh, ignore_errors=True)
-            shutil.copytree(source, fresh)
+            shutil.copytree(source, fresh, ignore=shutil.ignore_patterns(*step.without))
             shutil.rmtree(target, ignore_errors=True)
             fresh.rename(target)
         else:
