@@ -150,6 +150,8 @@ def _share(rows: Sequence[Row]) -> float:
 
 
 def _tone(rows: Sequence[Row]) -> str:
+    if not sum(map(failures, rows)):
+        return "none"
     known = [row for row in rows if np.isfinite(row["mais3_risk_high"])]
     risks, collisions = ([row[name] for row in known] for name in ("mais3_risk_high", "collisions"))
     return risk_tone(np.average(risks, weights=collisions) if known else np.nan)
