@@ -92,7 +92,7 @@ def _campaigns(scene: Path, driver: str, episodes: int) -> Iterator[Mapping[str,
     shared = {"scene": str(scene), "ego": {"driver": driver}, "assessment": {"episodes": episodes}}
     people = people_of(scene)
     if not people:
-        yield {"name": scene.name, **shared}
+        yield {"name": scene.name, "personas": [], **shared}
     for number, (seeds, personas) in enumerate(people.items()):
         name = f"{scene.name}{_SEED}{'-'.join(map(str, seeds))}" if number else scene.name
         policies = str(shipped("policies") / scene.name)

@@ -184,9 +184,9 @@ class Campaign(Document):
     """The name of the campaign. The default run folder is reports/<name>."""
     scene: DocumentPath
     """Folder of the scene, relative to this file, or the name of a shipped scene."""
-    personas: list[DocumentPath] = Field([], max_length=50)
+    personas: list[DocumentPath] = Field(max_length=50)
     """Files of the personas that the ego meets, one after the other, relative to this file, or names of shipped
-    personas. Left out: the ego drives alone and among SUMO's drivers."""
+    personas. With none, `[]`, the ego drives alone and among SUMO's drivers."""
     seeds: list[Seed] = Field([1], min_length=1, max_length=100)
     """Training seeds. All players are trained once per seed. All trainings are assessed in the same games: their starts
     are drawn from the first seed."""
