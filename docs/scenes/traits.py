@@ -4,6 +4,7 @@
 
 prints, from attribution.csv, in how many games the naive ego fails against the person as it is, against the person with
 this trait of the careful person, against the careful person, and against the careful person with this trait alone.
+Trainings of which the question is not answered, because a player can't drive the scene, are left out.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ def main(runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Run 
 def rows_of(run: Path) -> Iterator[list[str]]:
     """A row for each person and trait of a run folder. The first trait, all, is the careful person itself."""
     table = read_csv(run / "attribution.csv")
+    table = table[table["reason"] == ""].copy()
     table.loc[table["trait"] == "all", "failures_baseline"] = table["failures_without"]
     for (person, trait), of_seeds in table.groupby(["persona", "trait"], sort=False):
         counts = of_seeds[COUNTS].sum(min_count=1)
