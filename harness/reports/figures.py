@@ -10,6 +10,7 @@ import io
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from threading import RLock
 from typing import TYPE_CHECKING
 
 from markupsafe import Markup
@@ -55,14 +56,20 @@ GAME = "#game="
 """The beginning of the address of a recorded game of the page."""
 
 
+_DRAWING = RLock()
+
+
 @contextmanager
 def figure_of(width_in: float, height_in: float) -> Iterator[Figure]:
-    """An empty figure in the page's style, which is active within the with block."""
+    """An empty figure in the page's style, which is active within the with block.
+
+    One thread draws at a time: the style is that of the process, and a server of pages has several threads.
+    """
     import matplotlib
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context():
+    with _DRAWING, matplotlib.rc_context():
         matplotlib.rcdefaults()  # the user's matplotlibrc must not change the report
         matplotlib.rcParams.update(_STYLE | {"svg.hashsalt": "harness"})
         figure = Figure(figsize=(width_in, height_in))

@@ -198,7 +198,7 @@ def game(episode):
 segments.assess_batches = lambda arm, batches, begin, abandoned: (game(each) for batch in batches for each in batch)
 segments.plays_side_by_side = lambda arm: True
 class Anyone:
-    name, seed, scene, drivers = "a", 1, None, (None, None)
+    name, seed, scene, drivers, trace_schema = "a", 1, None, (None, None), SCHEMA
 parts = segments.segments_of(folder / "segments", episodes)
 run = StageRun(context=empty_context(folder))
 segments.play_segments(Anyone, parts, {"arm": "a", "persona": "", "seed": 1}, run)
