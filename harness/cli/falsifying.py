@@ -62,14 +62,17 @@ def _shown(searches: pd.DataFrame) -> Table:
     from rich.table import Table
 
     criteria = list(dict.fromkeys(searches["criterion"]))
-    table = Table("arm", "starts", *(escape(each.replace("_", " ")) for each in criteria))
+    table = Table(box=None, pad_edge=False, title_justify="left")
     table.title = "Mean games until the ego fails, and until it fails in a game that a reference driver prevents"
+    table.caption = "In brackets: searches that found one."
+    for heading in ("arm", "starts", *criteria):
+        table.add_column(escape(heading.replace("_", " ")), overflow="fold", no_wrap=heading in ("arm", "starts"))
     for (arm, searcher), rows in searches.groupby(["arm", "searcher"], sort=False):
         cells = []
         for criterion in criteria:
             first = rows.loc[rows["criterion"] == criterion, "first_game"]
             mean = first.fillna(rows["games"].iloc[0]).astype(float).mean()
-            cells.append(f"{mean:.0f} ({first.notna().sum()} of {len(first)})")
+            cells.append(f"{mean:.0f} ({first.notna().sum()}/{len(first)})")
         table.add_row(escape(arm), escape(searcher), *cells)
     return table
 

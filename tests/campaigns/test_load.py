@@ -122,7 +122,7 @@ def soak() -> Iterator[Weight]:
 
 
 def assessment() -> Iterator[Weight]:
-    """Five hundred short games, each with a simulation of its own load, and their traces, twenty-five games to a file."""
+    """Five hundred short games, each with a simulation of its own load, and their traces, 25 games to a file."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         games = assess(arm(build_scene(folder / "road", goal_m=60.0), Steady(), SumoDriver()), ASSESSED)
