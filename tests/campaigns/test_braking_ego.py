@@ -30,10 +30,10 @@ def league(tmp_path_factory: pytest.TempPathFactory) -> Path:
     _write_brake(folder / "brake.onnx")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        options = ("--scenes", "paper_merge,zebra", "--episodes", str(EPISODES), "--jobs", "1", "--out", "out")
+        options = ("--scenes", "paper_merge,red_light", "--episodes", str(EPISODES), "--jobs", "1", "--out", "out")
         done = CliRunner().invoke(app, ["league", "--ego", "brake.onnx", *options])
     assert done.exit_code == 0, done.output
-    assert "zebra: campaign 2 of 2, about" in done.output
+    assert "red_light: campaign 2 of 2, about" in done.output
     return folder / "out"
 
 
@@ -56,7 +56,7 @@ def rows(league: Path) -> pd.DataFrame:
 
 def test_rows__every_shipped_person_and_ordinary_traffic_in_every_scene(league: Path) -> None:
     people = ("nobody", "sumo", "paper_distracted", "paper_speedy")
-    pairings = {("paper_merge", person) for person in people} | {("zebra", "nobody"), ("zebra", "sumo")}
+    pairings = {("paper_merge", person) for person in people} | {("red_light", "nobody"), ("red_light", "sumo")}
     assert set(rows(league).index) == pairings
     assert set(rows(league)["ego"]) == {"brake"}
     assert set(rows(league)["episodes"]) == {EPISODES}
@@ -64,7 +64,7 @@ def test_rows__every_shipped_person_and_ordinary_traffic_in_every_scene(league: 
 
 def test_rows__an_ego_that_stands_runs_out_of_time(league: Path) -> None:
     """Alone it brakes to a stand in every game, which hurts nobody, and has no person to prevent anything against."""
-    for scene in ("paper_merge", "zebra"):
+    for scene in ("paper_merge", "red_light"):
         row = rows(league).loc[scene, "nobody"]
         assert row[["failure_rate", "failure_rate_high", "hard_brake_rate"]].tolist() == [1.0, 1.0, 1.0]
         assert row["failure_rate_low"] == pytest.approx(ALL_OF_THREE)
@@ -87,7 +87,7 @@ def test_rows__are_those_of_the_run_folders(league: Path) -> None:
 
 def test_page__cells_open_games_of_the_reports(league: Path) -> None:
     page = (league / "league.html").read_text(encoding="utf-8")
-    assert page.count('href="zebra/report.html#game=naive_alone,1,') == 2  # in the matrix and in the list
+    assert page.count('href="red_light/report.html#game=naive_alone,1,') == 2  # in the matrix and in the list
     assert "3 of 3" in page
 
 
@@ -96,7 +96,7 @@ def test_files_for_ci__have_each_pairing(league: Path) -> None:
     assert (result["exit_code"], result["failed"], len(result["rows"])) == (0, [], 6)
     junit = (league / "junit.xml").read_text(encoding="utf-8")
     assert 'tests="6"' in junit
-    assert "The ego fails in 3 of 3 games against nobody in zebra: 100" in junit
+    assert "The ego fails in 3 of 3 games against nobody in red_light: 100" in junit
 
 
 def test_table__the_same_ego_by_another_name_shares_the_rank(league: Path, tmp_path: Path) -> None:
