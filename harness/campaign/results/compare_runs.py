@@ -61,9 +61,13 @@ def compare_runs(folders: Sequence[Path], addresses: Sequence[str]) -> Compariso
 
 
 def _labels(folders: Sequence[Path]) -> list[str]:
-    """The folders' names, or their paths where two have the same name."""
-    names = [each.absolute().name for each in folders]
-    return names if len({*names}) == len(names) else [str(each) for each in folders]
+    """The folders' names; where two have the same name, with the names of the folders that they are in, or numbered."""
+    places = [each.absolute() for each in folders]
+    names, longer = [each.name for each in places], [f"{each.parent.name}/{each.name}" for each in places]
+    for found in (names, longer):
+        if len({*found}) == len(found):
+            return found
+    return [f"{number}. {name}" for number, name in enumerate(names, 1)]
 
 
 def _starts(manifest: Mapping[str, Any]) -> tuple[object, ...]:
