@@ -57,8 +57,8 @@ weighing = pytest.mark.skipif(
 GAMES = 64  # as many as campaigns train on
 GAME_STEPS = 1_000_000
 SEGMENT_STEPS = 131_072  # a training starts SUMO anew as often
-ASSESSED = 500
-GAMES_PER_FILE = 25
+ASSESSED = 1_000
+GAMES_PER_FILE = 50
 WEIGHED = 20  # times, while it goes on; the first quarter warms up
 
 SOAK_MB = 0.5  # what a million game-steps may add: 0.1 MB was measured
@@ -122,7 +122,7 @@ def soak() -> Iterator[Weight]:
 
 
 def assessment() -> Iterator[Weight]:
-    """Five hundred short games, each with a simulation of its own load, and their traces, 25 games to a file."""
+    """A thousand short games, each with a simulation of its own load, and their traces, fifty games to a file."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         games = assess(arm(build_scene(folder / "road", goal_m=60.0), Steady(), SumoDriver()), ASSESSED)
@@ -193,7 +193,7 @@ def test_soak__a_million_game_steps_leave_memory_as_it_was_and_open_nothing() ->
 
 @weighing
 @pytest.mark.slow
-def test_assessment__five_hundred_games_add_no_memory_beyond_what_libsumo_keeps_and_open_nothing() -> None:
+def test_assessment__a_thousand_games_add_no_memory_beyond_what_libsumo_keeps_and_open_nothing() -> None:
     ours, theirs = weighed("assessment"), weighed("bare_libsumo")
     assert ours[-1].done == theirs[-1].done == ASSESSED
     games = ours[-3].done - ours[2].done  # the medians of either end

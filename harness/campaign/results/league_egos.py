@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pandas as pd
 
 from harness.campaign.results.league_table import person_of
 from harness.campaign.storage.run_folder import MANIFEST, RunFolder
+from harness.config.campaign import Assessment
 from harness.errors import UsageError
 from harness.evaluation.comparisons.tied_ranks import GAME, league_ranks
 from harness.evaluation.tables import read_csv, write_csv
@@ -16,7 +16,7 @@ from harness.reports.provenance import scene_of
 
 LEAGUE = "league.csv"
 RANKS = "league_ranks.csv"
-SIGNIFICANCE = 0.01
+SIGNIFICANCE = Assessment().significance
 
 
 def rank_leagues(folder: Path) -> tuple[pd.DataFrame, Path]:
@@ -28,7 +28,7 @@ def rank_leagues(folder: Path) -> tuple[pd.DataFrame, Path]:
     if len(leagues) < 2:
         found = ", ".join(each.name for each in leagues) or "none"
         raise UsageError.of(folder, "", f"has fewer than two leagues: {found}", "play some: harness league --ego EGO")
-    games = pd.concat([frame for league in leagues for frame in _games_of(league)], ignore_index=True)
+    games = pd.concat([_games_of(league) for league in leagues], ignore_index=True)
     table = league_ranks(games, SIGNIFICANCE)
     if not table["games"].any():
         remedy = "play the same scenes: harness league --scenes"
@@ -37,7 +37,7 @@ def rank_leagues(folder: Path) -> tuple[pd.DataFrame, Path]:
     return table, folder / RANKS
 
 
-def _games_of(league: Path) -> Iterator[pd.DataFrame]:
+def _games_of(league: Path) -> pd.DataFrame:
     """The games of the scenes of a league, as `league_ranks` reads them: each game alone or beside SUMO's driver once,
     though it is played for people of every training seed."""
     ego = str(read_csv(league / LEAGUE)["ego"].iloc[0])
@@ -50,4 +50,4 @@ def _games_of(league: Path) -> Iterator[pd.DataFrame]:
         named = played.assign(scene=scene_of(run.manifest()), person=people, ego=ego)
         found.append(named.assign(seed=named["seed"].where(named["persona"] != "", 0)))
     games = pd.concat(found, ignore_index=True)
-    yield games.drop_duplicates(GAME)[[*GAME, "ego", "ego_failed"]]
+    return games.drop_duplicates(GAME)[[*GAME, "ego", "ego_failed"]]
