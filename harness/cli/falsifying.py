@@ -45,7 +45,7 @@ def falsify(
         folder = RunFolder(run)
         manifest = folder.manifest()
         players = RunPlayers(folder, ego=ego, allow_code=allow_code)
-        searches = planned_searches(players, arms or [], int(manifest["seeds"][0]) if seed is None else seed)
+        searches = planned_searches(folder, players, arms or [], int(manifest["seeds"][0]) if seed is None else seed)
         with progress_bar("games", console) as show:
             results = list(carry_out_searches(players, searches, games=games, repeats=repeats, on_progress=show))
         significance = manifest["campaign"]["assessment"]["significance"]

@@ -14,16 +14,21 @@ from harness.assessment.falsification import FIRST_EPISODE, Searcher, falsify
 from harness.assessment.rollout import Game
 from harness.assessment.seated_arm import SeatedArm
 from harness.campaign.execution.run_players import RunPlayers
+from harness.campaign.plan.alone_bounds import alone_bounds
 from harness.campaign.plan.planned_drivers import SumoDriven
 from harness.campaign.plan.stages import AssessmentStage
+from harness.campaign.results.read_run import episodes_of
+from harness.campaign.storage.run_folder import RunFolder
 from harness.drivers.reference_drivers import REFERENCES
 from harness.errors import UsageError
+from harness.evaluation.comparisons.comparison import games_by_arm
 from harness.evaluation.comparisons.games_to_failure import (
     FAILURE,
     SearchResult,
     falsification_table,
     searches_table,
 )
+from harness.evaluation.competence import gate
 from harness.evaluation.tables import write_csv
 from harness.files import make_folder
 
@@ -39,12 +44,16 @@ class PlannedSearch:
     learned: bool
 
 
-def planned_searches(players: RunPlayers, arms: Sequence[str], seed: int) -> list[PlannedSearch]:
+def planned_searches(folder: RunFolder, players: RunPlayers, arms: Sequence[str], seed: int) -> list[PlannedSearch]:
     """The searches of the arms, by default of those of the naive ego: learned people play from random starts, and
-    where SUMO drives for the people each searcher searches. Raises UsageError where the run has no such arm, or none
-    of the two kinds."""
+    where SUMO drives for the people each searcher searches. Raises UsageError where the run has no such arm, none of
+    one of the two kinds, or a player that can't drive the scene alone."""
     named = arms or [each.name for each in players.arms() if each.seed == seed and each.name.startswith(NAIVE_ARMS)]
     stages = [players.arm(name, seed) for name in named]
+    games = games_by_arm(episodes_of(folder))
+    for stage in stages:
+        if reason := gate(alone_bounds(players.document, stage.arm), seed, games)["reason"]:
+            raise UsageError.of(folder.path, stage.name, reason, "name arms of players that can drive")
     by_sumo = [all(isinstance(each, SumoDriven) for each in stage.non_ego) for stage in stages]
     if all(by_sumo) or not any(by_sumo):
         kind = "learned people" if all(by_sumo) else "an ordinary driver"

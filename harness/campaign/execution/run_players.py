@@ -60,7 +60,7 @@ class RunPlayers:
         folder.check_whole(manifest)
         self.scene: OpenScene = open_scene(folder.scene, driver.vehicle_type if driver is not None else None)
         self._folder, self._ego = folder, driver
-        document = Campaign.model_validate(manifest["campaign"], strict=False)
+        self.document = document = Campaign.model_validate(manifest["campaign"], strict=False)
         self._stages = planned(manifest)
         self._context = RunContext(
             folder=folder,
