@@ -1,4 +1,4 @@
-"""The figures of docs/game.md, from the tables of a run.
+"""The figures of docs/game-on-the-merge.md, from the tables of a run.
 
     python docs/game/figures.py gaps reports/merge-seeds              # best-response gaps
     python docs/game/figures.py failures reports/merge-arms-race      # failure rates of every ego against every non-ego

@@ -46,6 +46,7 @@ SECTIONS = {
         "manoeuvres",
         "manoeuvre-numbers",
         "game",
+        "rounds",
         "architecture",
         "testing",
         "reliability",
@@ -54,6 +55,7 @@ SECTIONS = {
     "Results": (
         "results",
         "personas-on-the-merge",
+        "game-on-the-merge",
         "reproduction",
         "reproduction-assumptions",
         "realism",

@@ -1,4 +1,4 @@
-"""The script behind docs/game.md: its tables, and that the page shows them."""
+"""The script behind docs/game-on-the-merge.md: its tables, and that the page shows them."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_failures__a_cell_is_the_mean_over_seeds_and_a_dash_without_games() -> N
     ],
 )
 def test_page__shows_the_output_of_the_script(table: str, source: Path, name: str) -> None:
-    page = (REPOSITORY / "docs" / "game.md").read_text(encoding="utf-8")
+    page = (REPOSITORY / "docs" / "game-on-the-merge.md").read_text(encoding="utf-8")
     assert getattr(figures, table)(figures.read(source, name)) in page
 
 
