@@ -201,14 +201,26 @@ def find_driver(written: str, file: Path, key: str, allow_code: bool) -> Externa
     if written.endswith(".toml") or "/" in written:
         remedy = nearest_beside(place) if os.path.isdir(place.parent) else f"no folder {place.parent}"
         if is_name(written, "policies"):
-            remedy += f"; shipped policies are {', '.join(shipped_policies())}"
+            remedy += f"; {_shipped_policies_as(written)}"
         raise UsageError.of(file, key, f"{written!r}: there is no such file or folder", remedy)
-    names = [LEARNED, SUMO, *installed, *shipped_names("egos"), *shipped_policies()]
+    names = [LEARNED, SUMO, *installed, *shipped_names("egos")]
     if written not in names:
-        remedy = nearest(written, names) + "; or name a driver document or the folder of a policy"
+        remedy = f"{nearest(written, names)}; or name a driver document or the folder of a policy"
+        remedy += f"; {_shipped_policies_as(written)}"
         raise UsageError.of(file, key, f"there is no driver {written!r}", remedy)
     package = version_of(entry_point(written, file, key))
     return _external(written, place.parent, Python(kind="python", entry_point=written), package=package)
+
+
+def _shipped_policies_as(written: str) -> str:
+    """A remedy: the shipped policies in the folder of a name, else one of every folder."""
+    policies = shipped_policies()
+    folder, _, _ = written.partition("/")
+    in_folder = [name for name in policies if name.startswith(f"{folder}/")]
+    one_of_each = {name.partition("/")[0]: name for name in reversed(policies)}
+    if in_folder:
+        return f"the shipped policies in {folder} are {', '.join(in_folder)}"
+    return f"shipped policies have names such as {', '.join(sorted(one_of_each.values()))}"
 
 
 def _from_document(written: str, place: Path, document: DriverDocument) -> ExternalDriver:

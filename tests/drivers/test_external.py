@@ -90,11 +90,18 @@ def test_find__a_shipped_policy_has_a_name_in_every_folder(tmp_path: Path) -> No
     assert find(NAIVE_BY_NAME, tmp_path).place == own
 
 
-@pytest.mark.parametrize("written", ["paper_merge/naive-seed2", "mine/naive-seed1", "qqq"])
-def test_find__an_unknown_policy_gets_the_shipped_ones_as_remedy(written: str, tmp_path: Path) -> None:
+def test_find__an_unknown_policy_gets_the_shipped_ones_of_its_folder_as_remedy(tmp_path: Path) -> None:
+    told = refusal(f"{FOLDER}/naive-seed2", tmp_path)
+    assert {name for name in shipped_policies() if name in told} == {
+        name for name in shipped_policies() if name.startswith(f"{FOLDER}/")
+    }
+
+
+@pytest.mark.parametrize("written", ["mine/naive-seed1", "qqq"])
+def test_find__an_unknown_policy_of_no_shipped_folder_gets_one_of_each_as_remedy(written: str, tmp_path: Path) -> None:
     told = refusal(written, tmp_path)
-    assert all(name in told for name in shipped_policies())
-    assert NAIVE_BY_NAME in shipped_policies()
+    named = [name.partition("/")[0] for name in shipped_policies() if name in told]
+    assert named == sorted({name.partition("/")[0] for name in shipped_policies()})
 
 
 @pytest.mark.parametrize(
