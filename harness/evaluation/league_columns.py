@@ -30,6 +30,12 @@ LEAGUE_MEASURES = (
     *rate("harm_to_others_rate", "Share of the games with harm_to_others: a person or a bystander fails."),
     Column("mean_speed_mps", NUMBER, "Mean over the games of the ego's average speed."),
     *rate("hard_brake_rate", "Share of the games in which the ego brakes hard (`hard_brake` in docs/manoeuvres.md)."),
+    Column(
+        "reason",
+        TEXT,
+        "Why the row says nothing about how the ego copes with people: it can't drive the scene alone. Empty where it "
+        "can, and for `nobody`.",
+    ),
 )
 LEAGUE_RANKS = (
     Column("rank", COUNT, "1, and the number of egos that fail significantly less often in the same games."),

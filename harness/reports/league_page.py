@@ -47,6 +47,7 @@ def render_league(ego: str, table: pd.DataFrame, addresses: Sequence[str], faile
             tones=RISK_TONES,
             rows=[(address, list(_texts(row))) for row, address in zip(rows, addresses, strict=True)],
             failed=failed,
+            incapable={row["scene"]: row["reason"] for row in rows if row["reason"]},
         )
     )
 
@@ -59,7 +60,8 @@ def league_terminal(table: pd.DataFrame, most: int = 12) -> Table:
     for heading in HEADINGS[:5]:
         shown.add_column(heading, overflow="fold")
     for row in table.head(most).to_dict("records"):
-        shown.add_row(*list(_texts(row))[:5], style="red" if row["failure_rate"] > _MUCH else None)
+        style = "dim" if row["reason"] else "red" if row["failure_rate"] > _MUCH else None
+        shown.add_row(*list(_texts(row))[:5], style=style)
     return shown
 
 
@@ -81,7 +83,10 @@ def sentence_of(row: Mapping[Any, Any]) -> str:
     """What a row of the table says, in a sentence."""
     low, high = row["failure_rate_low"], row["failure_rate_high"]
     who = f"against {person_in_words(row['person'])} in {row['scene']}"
-    return f"The ego fails in {_counts(row)} games {who}: {percent(row['failure_rate'])} (95 %: {interval(low, high)})."
+    fails = (
+        f"The ego fails in {_counts(row)} games {who}: {percent(row['failure_rate'])} (95 %: {interval(low, high)})."
+    )
+    return f"{fails} It can't drive the scene: {row['reason']}." if row["reason"] else fails
 
 
 def person_in_words(person: str) -> str:
@@ -97,7 +102,7 @@ def _cell(row: Mapping[Any, Any], address: str) -> FailureCell:
         rate=percent(row["failure_rate"]),
         counts=_counts(row),
         spans=(),
-        tone=risk_tone(risk) if _failures(row) else "none",
+        tone=risk_tone(risk) if _failures(row) and not row["reason"] else "none",
         game=address,
     )
 

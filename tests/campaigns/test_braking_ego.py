@@ -73,6 +73,18 @@ def test_rows__an_ego_that_stands_runs_out_of_time(league: Path) -> None:
         assert np.isnan(row["preventable_rate"])
 
 
+def test_rows__of_people_say_nothing_where_the_ego_cannot_drive_the_scene_alone(league: Path) -> None:
+    """They are the last, and the page says why."""
+    reason = "alone it reaches its goal in 0 of 3 games (0 %), below 97 %"
+    reasons = rows(league)["reason"]
+    assert {person: told for (_, person), told in reasons.items() if person == "nobody"} == {"nobody": ""}
+    assert set(reasons.drop("nobody", level="person")) == {reason}
+    assert [person for _, person in reasons.index[:2]] == ["nobody", "nobody"]
+    page = (league / "league.html").read_text(encoding="utf-8")
+    assert all(f"The ego can’t drive {scene}: {reason}." in page for scene in ("paper_merge", "red_light"))
+    assert f"It can't drive the scene: {reason}." in (league / "junit.xml").read_text(encoding="utf-8")
+
+
 def test_rows__are_those_of_the_run_folders(league: Path) -> None:
     """How many failures the driver of UN R157 prevents from the start is counted again, game by game."""
     judged = read_csv(league / "paper_merge" / "reference_drivers.csv")

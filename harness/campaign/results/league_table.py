@@ -1,6 +1,6 @@
 """The results of a league, from the run folders of its campaigns.
 
-league.csv     a row for each pairing, worst first
+league.csv     a row for each pairing, worst first; after them those of scenes that the ego can't drive alone
 league.html    the matrix of scenes and people, and the rows; their cells open games in the reports of the scenes
 result.json    the rows, what failed, and the exit code
 junit.xml      a test for each pairing and each stage: an error where games could not be played
@@ -21,9 +21,11 @@ from harness.campaign.results.ci_files import JUNIT, RESULT
 from harness.campaign.results.kept_results import RunResult
 from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.versions import versions
+from harness.config.campaign import Competence
 from harness.errors import FAILED
 from harness.evaluation.comparisons.comparison import rate_cells
 from harness.evaluation.comparisons.preventability import by_regulation
+from harness.evaluation.competence import goals_alone
 from harness.evaluation.league_columns import NOBODY, SUMO_DRIVER
 from harness.evaluation.strategies import NAIVE_ALONE, NAIVE_VS_SUMO
 from harness.evaluation.tables import read_csv, table_of, write_csv
@@ -36,6 +38,7 @@ from harness.reports.provenance import scene_of
 
 _PLACED = {NAIVE_ALONE.name: NOBODY, NAIVE_VS_SUMO.name: SUMO_DRIVER}
 _NOT_FINISHED = "it is not finished"
+EGO_GOAL_SHARE = Competence().ego_goal_share
 _COPIED = (
     *("arm", "seed", "episodes", "errors", "failure_rate", "failure_rate_low", "failure_rate_high"),
     *("collisions", "rails", "timeouts", "mean_speed_mps"),
@@ -66,8 +69,9 @@ def write_league(ego: str, folder: Path, results: Mapping[str, RunResult]) -> Le
         if (run.path / "summary.csv").is_file():
             rows += _rows(ego, run, games)
     table = table_of("league", _each_once(rows)).sort_values(
-        ["failure_rate", "serious_injuries", "scene", "person", "seed"],
-        ascending=[False, False, True, True, True],
+        ["reason", "failure_rate", "serious_injuries", "scene", "person", "seed"],
+        ascending=[True, False, False, True, True, True],
+        key=lambda column: column != "" if column.name == "reason" else column,
         kind="stable",
         ignore_index=True,
     )
@@ -120,13 +124,16 @@ def _rows(ego: str, run: RunFolder, games: dict[tuple[str, str, int], str]) -> I
         person = person_of(arm, row["persona"])
         if row["failure_rate"] != row["failure_rate"] and not row["errors"]:
             continue  # a persona alone
-        of_arm = episodes[(episodes["arm"] == arm) & (episodes["seed"] == seed)]
+        of_seed = episodes[episodes["seed"] == seed]
+        of_arm, alone = (of_seed[of_seed["arm"] == each] for each in (arm, NAIVE_ALONE.name))
         played = of_arm[of_arm["error"] == ""]
         brakes = manoeuvres[(manoeuvres["arm"] == arm) & (manoeuvres["seed"] == seed)]
         hard = brakes[(brakes["player"] == "ego") & (brakes["manoeuvre"] == "hard_brake")]["episode"].nunique()
         cells = {name: row[name] for name in _COPIED} | {"ego": ego, "scene": scene, "person": person}
         cells |= {"serious_injuries": played["mais3_risk_high"].sum() / len(played) if len(played) else np.nan}
         cells |= rate_cells("hard_brake_rate", hard, len(played))
+        goals = goals_alone(alone, "ego")
+        cells["reason"] = "" if person == NOBODY or goals.suffice(EGO_GOAL_SHARE) else goals.below(EGO_GOAL_SHARE)
         of_regulation = [] if prevented is None else by_regulation(prevented[prevented["seed"] == seed], arm)
         for end in ("", "_low", "_high"):
             cells[f"preventable_rate{end}"] = of_regulation[0][f"from_start_rate{end}"] if of_regulation else np.nan
