@@ -22,7 +22,6 @@ NOT_READ_THROUGH = re.compile(r"^ *```.*?^ *```|<!-- output of: .*?<!-- end of o
 MOST_WORDS = 1500
 LONGER = {
     "columns.md": "a table for looking up, which `harness columns` writes",
-    "egos.md": "not split yet",
     "game.md": "not split yet",
 }
 LINK = re.compile(r"\]\((?![a-z]+:)([^)\s#]*)#?([^)\s]*)\)")
