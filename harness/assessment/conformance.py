@@ -25,11 +25,12 @@ from harness.config.campaign import LEARNED, SUMO
 from harness.drivers.car import car_of
 from harness.drivers.external import find_driver
 from harness.drivers.policy_origin import other_games
-from harness.drivers.protocol import Driver
+from harness.drivers.protocol import Driver, Planner, planner_of
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
 from harness.errors import SimulationError, UsageError
 from harness.game.arrays import FloatArray, IntArray
+from harness.game.cartesian_view import CartesianView
 from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import draw_initial_state
 from harness.game.outcome import Outcome
@@ -43,11 +44,12 @@ TOLERANCE = 1e-5
 
 
 class Decision(NamedTuple):
-    """One decision of a driver in a game: observation [SIZE], noise [2], action [2]."""
+    """One decision of a driver in a game: observation [SIZE], noise [2], action [2], and the view of a planner."""
 
     observation: FloatArray
     noise: FloatArray
     action: FloatArray
+    view: CartesianView | None = None
 
 
 class _PlayedGame(NamedTuple):
@@ -108,6 +110,7 @@ class _CheckedDriver:
         self._driver, self._seconds = driver, seconds
         self.takes_over = driver.takes_over
         self.decisions: list[Decision] = []
+        self._views: list[CartesianView] = []
 
     def reset(self, games: IntArray) -> None:
         self._driver.reset(games)
@@ -120,8 +123,25 @@ class _CheckedDriver:
         if not (np.array_equal(observation_argument, observation) and np.array_equal(noise_argument, noise)):
             raise _Violation("it modified the observation or the noise it was given: work on a copy")
         actions = _checked(result, len(games))
-        self.decisions += map(Decision, observation.copy(), noise.copy(), actions)
+        self.decisions += map(Decision, observation.copy(), noise.copy(), actions, self._views or [None] * len(games))
         return actions
+
+
+class _CheckedPlanner(_CheckedDriver):
+    """A planner with a check of every decision. Its views are recorded."""
+
+    def __init__(self, driver: Driver, planner: Planner, seconds: list[float]) -> None:
+        super().__init__(driver, seconds)
+        self._planner, self.history_s = planner, planner.history_s
+
+    def see(self, games: IntArray, views: Sequence[CartesianView]) -> None:
+        self._views = list(views)
+        self._planner.see(games, views)
+
+
+def _with_checks(driver: Driver, seconds: list[float]) -> _CheckedDriver:
+    planner = planner_of(driver)
+    return _CheckedDriver(driver, seconds) if planner is None else _CheckedPlanner(driver, planner, seconds)
 
 
 def _checked(result: object, games: int) -> FloatArray:
@@ -200,7 +220,7 @@ def difference_of(driver: Driver, scene: OpenScene) -> str:
 def _play(driver: Driver, scene: OpenScene, games: int, *, findings: Findings, activity: str) -> list[_PlayedGame]:
     players = len(scene.world.roles)
     start_distribution = scene.start_distribution([HumanFactors()] * players, [1.0] * players)
-    checked, played, outcomes = _CheckedDriver(driver, findings.seconds), list[_PlayedGame](), list[str]()
+    checked, played, outcomes = _with_checks(driver, findings.seconds), list[_PlayedGame](), list[str]()
     findings.game_seconds = []
     arena = Arena(scene, 1, [Seat(checked), *[Seat(SumoDriver())] * (players - 1)])
     try:
@@ -264,7 +284,7 @@ def _check_independence(driver: Driver, played: Sequence[Sequence[Decision]], fi
     replayed[shortest] = [*played[shortest], *played[shortest]]
     reset_at = len(played[shortest])
     seconds, rows_of_call = list[float](), list[int]()
-    checked = _CheckedDriver(driver, seconds)
+    checked = _with_checks(driver, seconds)
     checked.reset(np.arange(len(replayed)))
     for step in range(max(map(len, replayed))):
         if step == reset_at:
@@ -272,6 +292,8 @@ def _check_independence(driver: Driver, played: Sequence[Sequence[Decision]], fi
         games = np.array([game for game, each in enumerate(replayed) if step < len(each)])
         rows = [replayed[game][step] for game in games]
         rows_of_call.append(len(rows))
+        if isinstance(checked, _CheckedPlanner):
+            checked.see(games, [row.view for row in rows if row.view is not None])
         actions = checked.decide(games, np.array([r.observation for r in rows]), np.array([r.noise for r in rows]))
         difference = np.abs(actions - np.array([row.action for row in rows])).max(axis=1)
         if difference.max() > TOLERANCE:

@@ -193,6 +193,10 @@ class RecordedCourses:
         reading.signals = np.stack([course.signals[step] for course, step in now])
         return reading
 
+    def turn_signals(self, vehicles: Sequence[tuple[int, str]]) -> list[str]:
+        """Off: a recording has none."""
+        return ["off"] * len(vehicles)
+
     def close(self) -> None:
         """Do nothing."""
 

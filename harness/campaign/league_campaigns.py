@@ -133,7 +133,9 @@ def _seen(ego: str) -> DriverDocument | None:
             algorithm = saved_by(path)
             if algorithm is None:
                 message = f"{ego!r} does not tell which algorithm of Stable-Baselines3 saved it"
-                raise UsageError.of(_OPTION, "", message, "name a driver document with its `algorithm` (docs/egos.md)")
+                raise UsageError.of(
+                    _OPTION, "", message, "name a driver document with its `algorithm` (docs/egos-by-networks.md)"
+                )
             return StableBaselines3.model_validate(
                 {"kind": "stable_baselines3", "file": str(path), "algorithm": algorithm}
             )

@@ -144,10 +144,8 @@ def open_campaign(
     if ego_driver is not None and scene is not None:
         collect(problems, partial(_note_origin, ego_driver, scene, ego_persona, elsewhere))
         sampled = ego_persona is not None and ego_persona.decisions == "sampled"
-        collect(
-            problems,
-            lambda: ego_driver.try_out(car_of(scene.world, EGO), sampled, _games_at_once(document, ego_driver)),
-        )
+        games, road = _games_at_once(document, ego_driver), lambda: scene.cartesian_roads[EGO]
+        collect(problems, lambda: ego_driver.try_out(car_of(scene.world, EGO), sampled, games, road=road))
     other_egos: dict[str, ExternalDriver] = {}
     if document is not None:
         problems += _ignored_tables(file, document, ego_driver)

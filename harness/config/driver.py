@@ -54,8 +54,16 @@ class WithFiles(Document):
         return {key: file for key, file in named.items() if file is not None}
 
 
+class Cartesian(Document):
+    """The table that asks for the road and the road users in Cartesian coordinates (docs/egos-in-cartesian.md)."""
+
+    history_s: float = Field(0.0, ge=0.0, le=10.0)
+    """The length of the history that each view has."""
+
+
 class Process(Adjustable, WithFiles):
-    """A program in any language that answers observations with controls. The protocol is in docs/egos.md."""
+    """A program in any language that answers observations with controls, by the protocol of
+    docs/egos-by-programs.md."""
 
     parameter_table: ClassVar[str] = "parameters"
 
@@ -74,6 +82,9 @@ class Process(Adjustable, WithFiles):
     """Longest time of the start."""
     parameters: dict[ParameterName, bool | int | float | str] = Field({}, max_length=1000)
     """Parameters that the program receives in the first message, under `parameters`."""
+    cartesian: Cartesian | None = None
+    """With this table, even an empty one, the program receives the road and the road users in Cartesian coordinates,
+    beside the observations."""
 
 
 class Fmu(Adjustable, WithFiles):
@@ -161,6 +172,9 @@ class Python(Adjustable, WithFiles):
     """The name of the entry point, as the package declares it."""
     parameters: dict[str, Any] = Field({}, max_length=1000)
     """Keyword arguments of the entry point."""
+    cartesian: Cartesian | None = None
+    """With this table, even an empty one, `decide` receives the road and the road users in Cartesian coordinates, as a
+    fourth argument."""
 
 
 DriverDocument: TypeAlias = Sumo | Rules | Process | Fmu | StableBaselines3 | Onnx | TorchScript | Python

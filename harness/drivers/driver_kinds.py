@@ -9,11 +9,11 @@ from harness.config.driver import DriverDocument, Fmu, Onnx, Process, Python, St
 from harness.config.rule_driver import Rules
 from harness.drivers.car import Car
 from harness.drivers.driver_files import resolve_in
-from harness.drivers.entry_points import entry_point, installed_driver
+from harness.drivers.entry_points import PackagedPlanner, entry_point, installed_driver
 from harness.drivers.fmu import fmu_driver
 from harness.drivers.network_driver import NetworkDriver
 from harness.drivers.policy_file import LearnedDriver, read_policy
-from harness.drivers.process import ProcessDriver
+from harness.drivers.process import PlanningProcess, ProcessDriver
 from harness.drivers.protocol import Driver
 from harness.drivers.rules_driver import RulesDriver
 from harness.drivers.sumo import SumoDriver
@@ -54,16 +54,14 @@ def make_driver(
             return SumoDriver()
         case Rules():
             return RulesDriver(document, car)
-        case Process(folder=folder, units=units):
-            return ProcessDriver(
-                command,
-                resolve_in(place, folder),
-                car,
-                units=units,
-                deadline_s=document.deadline_s,
-                start_deadline_s=document.start_deadline_s,
-                parameters=document.parameters,
-            )
+        case Process(folder=folder, cartesian=cartesian):
+            asked = {
+                name: getattr(document, name) for name in ("units", "deadline_s", "start_deadline_s", "parameters")
+            }
+            arguments = (command, resolve_in(place, folder), car)
+            if cartesian is None:
+                return ProcessDriver(*arguments, **asked)
+            return PlanningProcess(*arguments, **asked, history_s=cartesian.history_s)
         case Fmu(file=file):
             return fmu_driver(document, resolve_in(place, file), car)
         case StableBaselines3(file=file, normalize=normalize):
@@ -73,5 +71,8 @@ def make_driver(
             return Sb3Driver(document, resolve_in(place, file), sampled, scaling)
         case Onnx(file=file) | TorchScript(file=file):
             return NetworkDriver(document, resolve_in(place, file), car)
-        case Python(entry_point=name, parameters=parameters):
-            return installed_driver(entry_point(name, place, "entry_point"), car, parameters)
+        case Python(entry_point=name, parameters=parameters, cartesian=cartesian):
+            point = entry_point(name, place, "entry_point")
+            if cartesian is None:
+                return installed_driver(point, car, parameters)
+            return PackagedPlanner(installed_driver(point, car, parameters, plans=True), cartesian.history_s)

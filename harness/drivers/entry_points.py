@@ -4,7 +4,8 @@
     my_driver = "my_package:driver"
 
 The entry point is a callable. Its arguments are the car (`harness.drivers.car.Car`) and, as keywords, the document's
-parameters; it returns a `harness.drivers.protocol.Driver`.
+parameters; it returns a `harness.drivers.protocol.Driver`. With the table `[cartesian]` in the document, the driver's
+`decide` has a fourth parameter: the views [N] (`harness.game.cartesian_view.CartesianView`) of the games.
 """
 
 from __future__ import annotations
@@ -12,7 +13,8 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import importlib.util
-from collections.abc import Mapping
+import inspect
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +23,8 @@ from harness.drivers.car import Car
 from harness.drivers.driver_files import sha256_of
 from harness.drivers.protocol import Driver
 from harness.errors import DriverError, UsageError
+from harness.game.arrays import FloatArray, IntArray
+from harness.game.cartesian_view import CartesianView
 
 GROUP = "harness.drivers"
 
@@ -56,8 +60,11 @@ def version_of(point: importlib.metadata.EntryPoint) -> dict[str, str]:
     }
 
 
-def installed_driver(point: importlib.metadata.EntryPoint, car: Car, parameters: Mapping[str, Any]) -> Driver:
-    """Make an installed driver. Raises DriverError if the package raises an error or returns no driver."""
+def installed_driver(
+    point: importlib.metadata.EntryPoint, car: Car, parameters: Mapping[str, Any], *, plans: bool = False
+) -> Driver:
+    """Make an installed driver; `plans`: its `decide` takes views. Raises DriverError if the package raises an error,
+    or returns no such driver."""
     try:
         driver = point.load()(car, **parameters)
     except Exception as error:  # a package may raise any exception
@@ -67,7 +74,33 @@ def installed_driver(point: importlib.metadata.EntryPoint, car: Car, parameters:
         missing = [name for name in ("takes_over", "reset", "decide") if not hasattr(driver, name)]
         what = f"returned a {type(driver).__name__} without {', '.join(missing)}"
         raise DriverError(f"{point.name} ({point.value}) {what}")
+    try:
+        inspect.signature(driver.decide).bind(*["games", "observation", "noise", "views"][: 4 if plans else 3])
+    except TypeError as error:
+        what = f"has another decide: {error}; it gets views with the table [cartesian] in its document, and only then"
+        raise DriverError(f"{point.name} ({point.value}) {what}") from None
     return driver
+
+
+class PackagedPlanner:
+    """Drives as an installed driver whose `decide` takes views."""
+
+    def __init__(self, driver: Any, history_s: float) -> None:
+        self._driver, self.takes_over, self.history_s = driver, bool(driver.takes_over), history_s
+        self._views: Sequence[CartesianView] = ()
+
+    def reset(self, games: IntArray) -> None:
+        """Reset games [N]."""
+        self._driver.reset(games)
+
+    def see(self, games: IntArray, views: Sequence[CartesianView]) -> None:
+        """Keep the views [N] for the next decision."""
+        self._views = views
+
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        """The driver's actions [N, 2] from observations [N, SIZE], noise [N, 2] and the views."""
+        decided: FloatArray = self._driver.decide(games, observation, noise, self._views)
+        return decided
 
 
 def _code(module: str) -> str:

@@ -10,7 +10,7 @@ line. An installed package needs no permission, because the user has installed i
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -45,8 +45,9 @@ from harness.drivers.driver_kinds import driver_in_words, make_driver
 from harness.drivers.entry_points import entry_point, installed_names, version_of
 from harness.drivers.fmu import unconnected_inputs
 from harness.drivers.policy_file import check_no_archive, policy_files, read_policy
-from harness.drivers.protocol import Driver
+from harness.drivers.protocol import Driver, planner_of
 from harness.errors import DriverError, UsageError
+from harness.game.cartesian_view import CartesianRoad, CartesianView
 from harness.game.observation_layout import SIZE
 from harness.shipped_documents import find_document, is_name, shipped_names, shipped_policies
 
@@ -161,12 +162,18 @@ class ExternalDriver:
             raise DriverError(f"changed since the campaign was checked: {', '.join(changed)}")
         return make_driver(self.document, self.place, command=self.command, car=car, sampled=sampled)
 
-    def try_out(self, car: Car, sampled: bool, games: int = 1) -> None:
-        """Make the driver, reset this number of games and decide once in each. Raises UsageError if that fails."""
+    def try_out(
+        self, car: Car, sampled: bool, games: int = 1, *, road: Callable[[], CartesianRoad] | None = None
+    ) -> None:
+        """Make the driver, reset this number of games and decide once in each, on the `road` if it is a planner. Raises
+        UsageError if that fails."""
         try:
             driver = self.make(car, sampled)
             if driver.takes_over:
                 driver.reset(np.arange(games))
+                planner = planner_of(driver)
+                if planner is not None and road is not None:
+                    planner.see(np.arange(games), [CartesianView.at_start(road())] * games)
                 driver.decide(np.arange(games), np.zeros((games, SIZE), dtype=np.float32), np.zeros((games, 2)))
         except UsageError:
             raise

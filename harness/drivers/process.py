@@ -1,7 +1,8 @@
 """A program as a driver: one line of JSON per message and per answer over its standard streams, with a deadline.
 
-The messages are those of docs/egos.md. A program that crashes, misses a deadline or sends an invalid answer is killed,
-and its game fails; the next game starts a new process. The program is killed with its driver and with the harness.
+The messages are those of docs/egos-by-programs.md. A program that crashes, misses a deadline or sends an invalid answer
+is killed, and its game fails; the next game starts a new process. The program is killed with its driver and with the
+harness.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -19,6 +21,7 @@ from harness.drivers.car import Car
 from harness.drivers.running_program import NoAnswer, Program
 from harness.errors import DriverError
 from harness.game.arrays import FloatArray, IntArray
+from harness.game.cartesian_view import CartesianView
 from harness.game.observation_layout import LAYOUT
 
 PROTOCOL = 2
@@ -57,6 +60,7 @@ class ProcessDriver:
         if parameters:
             self._hello["parameters"] = dict(parameters)
         self._program: Program | None = None
+        self._shown: dict[str, Any] = {}  # added to the message of a decision
 
     def reset(self, games: IntArray) -> None:
         """Reset games [N]. Raises DriverError if the program can't be started or does not support the protocol."""
@@ -73,6 +77,7 @@ class ProcessDriver:
         answer."""
         rows = self._car.physical(observation) if self._si else observation
         message = {"type": "decide", "games": games.tolist(), "observation": rows.tolist(), "noise": noise.tolist()}
+        message |= self._shown
         actions = _actions(self._request(message, self._deadline_s).get("actions"), len(games))
         if isinstance(actions, str):
             raise self._failure(f"answered with invalid actions: {actions}")
@@ -109,6 +114,43 @@ class ProcessDriver:
         tail = self._program.stderr_tail()
         self.close()
         return DriverError(f"{self._name} {what}" + (f"; on its standard error: {tail}" if tail else ""))
+
+
+class PlanningProcess(ProcessDriver):
+    """Drives by the answers of a program that gets views in Cartesian coordinates with its observations."""
+
+    def __init__(self, *arguments: Any, history_s: float, **options: Any) -> None:
+        """The arguments but `history_s` are those of `ProcessDriver`."""
+        super().__init__(*arguments, **options)
+        self.history_s = history_s
+        self._told: Program | None = None  # the program that has the road
+
+    def see(self, games: IntArray, views: Sequence[CartesianView]) -> None:
+        """Keep the views [N] for the next decision. A program that has just started gets the road first. Raises
+        DriverError if it does not take it."""
+        if self._program is not self._told:
+            self._request({"type": "road", "road": _plain(views[0].road)}, self._start_deadline_s)
+            self._told = self._program
+        self._shown = {"views": [_plain_view(view, with_history=self.history_s > 0.0) for view in views]}
+
+
+def _plain_view(view: CartesianView, *, with_history: bool) -> dict[str, Any]:
+    """A view as a message has it: without the road, which the program has."""
+    own = {each.name: _plain(getattr(view, each.name)) for each in fields(view) if each.name not in ("road", "history")}
+    if with_history:
+        own["history"] = [_plain_view(each, with_history=False) for each in view.history]
+    return own
+
+
+def _plain(value: Any) -> Any:
+    """A value of a road or a view, such as JSON has it."""
+    if is_dataclass(value):
+        return {each.name: _plain(getattr(value, each.name)) for each in fields(value)}
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return {key: _plain(each) for key, each in value.items()}
+    return [_plain(each) for each in value] if isinstance(value, tuple) else value
 
 
 def _actions(answer: Any, games: int) -> FloatArray | str:

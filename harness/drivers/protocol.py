@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol, runtime_checkable
 
 from harness.game.arrays import FloatArray, IntArray
+from harness.game.cartesian_view import CartesianView
 
 
 @runtime_checkable
@@ -34,3 +36,22 @@ class Driver(Protocol):
         """Actions [N, 2] in [-1, 1] (pedals, wheel: see `harness.game.bicycle.requests`) in games [N], from the
         player's observations [N, SIZE] and standard normal noise [N, 2]."""
         ...
+
+
+@runtime_checkable
+class Planner(Driver, Protocol):
+    """A driver that gets, beside its observation, the road and what it sees in Cartesian coordinates."""
+
+    history_s: float
+    """The length of the history in its views."""
+
+    def see(self, games: IntArray, views: Sequence[CartesianView]) -> None:
+        """The views [N] for the next decision, which is in games [N]."""
+
+
+def planner_of(driver: Driver) -> Planner | None:
+    """The planner that a driver is, or that it holds as `wrapped`; None if there is none."""
+    within: Driver | None = driver
+    while within is not None and not isinstance(within, Planner):
+        within = getattr(within, "wrapped", None)
+    return within

@@ -29,7 +29,9 @@ class ShieldedDriver:
 
     def __init__(self, driver: Driver, world: World) -> None:
         """The driver is that of the ego in this world."""
-        self._driver, self._car = driver, car_of(world, EGO)
+        self._car = car_of(world, EGO)
+        self.wrapped = driver
+        """The driver behind the shield."""
         self._rule = reference_driver("rss", self._car, lane_width_of(world))
         self._braking_mps2 = Rss().full_braking_g * GRAVITY_MPS2
         self.intervenes: BoolArray = np.zeros(0, dtype=bool)
@@ -40,11 +42,11 @@ class ShieldedDriver:
         missing = int(games.max(initial=-1)) + 1 - len(self.intervenes)
         self.intervenes = np.pad(self.intervenes, (0, max(missing, 0)))
         self.intervenes[games] = False
-        self._driver.reset(games)
+        self.wrapped.reset(games)
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
         """The driver's actions [N, 2]; in danger, the pedals of full braking if the driver brakes less."""
-        decided = self._driver.decide(games, observation, noise)
+        decided = self.wrapped.decide(games, observation, noise)
         braking = self._car.actions(np.full(len(games), -self._braking_mps2), np.zeros(len(games)), observation)[:, 0]
         changed = self._rule.sees_danger(observation) & (decided[:, 0] > braking)
         self.intervenes[games] = changed

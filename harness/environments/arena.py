@@ -14,14 +14,15 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from harness.environments.cartesian_views import CartesianViews, Sights
 from harness.environments.nearby_bodies import NearbyBodies
-from harness.environments.seats import Seat as Seat
-from harness.environments.seats import with_walkers
+from harness.environments.seats import Seat, with_walkers
+from harness.environments.sumo_players import read_signals, read_sumo_players
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.bicycle import Requested, move, requests
 from harness.game.human_factors import PlayersLimits, held_steering_rad, release_controls
 from harness.game.initial_state import InitialState
-from harness.game.memory import Memory
+from harness.game.memory import Memory, Perceived, as_they_are
 from harness.game.observation import observe
 from harness.game.observation_layout import SIZE
 from harness.game.outcome import Outcome
@@ -29,7 +30,6 @@ from harness.game.quantities import Quantities
 from harness.game.sanity_checks import check_observation, check_step, checked_decisions
 from harness.game.sliding import along_rail, slide
 from harness.game.state import State, terminations
-from harness.game.traffic_rules import since_change_s
 from harness.game.walking import walk
 from harness.road.demand.route_file import Departure
 from harness.road.scene.open_scene import OpenScene
@@ -47,6 +47,8 @@ class LiveSimulation:
             "that makes it, such as lambda: gymnasium.make('harness:harness/Ego-v0'), and call that where it is needed"
         )
 
+
+__all__ = ["Arena", "LiveSimulation", "Seat", "Step"]
 
 # comparing arrays with members of an enumeration is slower
 _RUNNING, _GOAL = int(Outcome.RUNNING), int(Outcome.GOAL)
@@ -118,6 +120,7 @@ class Arena(LiveSimulation):
         self.signal_texts = [""] * games
         """States of the traffic lights as `Reading.signal_texts`; up to date if games are recorded."""
         self.nearby = NearbyBodies(self.world, scene.obstacles, games)
+        self._views = CartesianViews(scene, [[seat.driver for seat in of_player] for of_player in self.seats])
 
     def reset(
         self, starts: Mapping[int, InitialState], departures: Mapping[int, list[Departure]] | None = None
@@ -137,6 +140,7 @@ class Arena(LiveSimulation):
             if seat.driver is not None:
                 seat.driver.reset(games[plays[games]])
         self._memory.begin(self.state)
+        self._views.reset(games)
         quantities = self.first_quantities(games)
         observation = self.observation[games] = observe(quantities)
         self._road_steering_rad[games] = quantities.along.road_steering_rad
@@ -165,10 +169,8 @@ class Arena(LiveSimulation):
         if sliding.any():
             slide(state, sliding, self._course_rad, world.step_s)
         reading = self.reading = self.simulation.step(state.x_m, state.y_m, state.heading_rad)
-        if reading.signals is not None:
-            state.signal_s = since_change_s(before.signals, reading.signals, before.signal_s, world.step_s)
-            state.signals = reading.signals
-            self.signal_texts = list(reading.signal_texts or self.signal_texts)
+        read_signals(state, before, reading, world.step_s)
+        self.signal_texts = list(reading.signal_texts or self.signal_texts)
         read_sumo_players(state, reading, drove=drove, taken_over=self._taken_over, step_s=world.step_s)
         state.station_m, offset_m = world.road.routes.locate(state.x_m, state.y_m, before.station_m)
         quantities = self._quantities(state, before, offset_m)
@@ -199,6 +201,8 @@ class Arena(LiveSimulation):
             games = np.flatnonzero(plays)
             if seat.driver is not None and seat.driver.takes_over and len(games):
                 noise = self._noise[games, player, now[games]]
+                if (planner := self._views.planner(seat.driver)) is not None:
+                    self._views.show(planner, player, games, self._sights(games))
                 decided = seat.driver.decide(games, self.observation[games, player], noise)
                 of = f"{self.world.roles[player]}, {type(seat.driver).__name__},"
                 chosen[games, player] = checked_decisions(decided, of, games, state.step)
@@ -280,10 +284,28 @@ class Arena(LiveSimulation):
 
     def _seen(self, quantities: Quantities, games: IntArray) -> FloatArray:
         """[N, P, SIZE] the observations of games [N] with these quantities."""
+        return observe(quantities, self._perceived(quantities, games) if self._limits.delays else None)
+
+    def _perceived(self, quantities: Quantities, games: IntArray) -> Perceived:
+        """The bodies of games [N] as the players take them to be."""
         if not self._limits.delays:
-            return observe(quantities)
+            return as_they_are(quantities.bodies, len(self.seats))
         lags = self._limits.lags(self.state.step)[games]
-        return observe(quantities, self._memory.perceived(quantities.bodies, lags, games))
+        return self._memory.perceived(quantities.bodies, lags, games)
+
+    def _sights(self, games: IntArray) -> Sights:
+        """What there is to see in games [N] now; the ways of the players do not matter for it."""
+        state = self.state.of(games)
+        quantities = self._quantities(state, state, np.zeros(state.x_m.shape), games)
+        return Sights.of(
+            quantities,
+            self._perceived(quantities, games),
+            games=games,
+            nearby=self.nearby,
+            reading=self.reading,
+            taken_over=self._taken_over,
+            simulation=self.simulation,
+        )
 
     # --- observations ------------------------------------------------------------------------------------
 
@@ -324,21 +346,3 @@ class Arena(LiveSimulation):
             lateral_offset_m=offset_m,
             gained_mps2=state.acceleration_mps2 - before.acceleration_mps2,
         )
-
-
-def read_sumo_players(
-    state: State, reading: Reading, *, drove: BoolArray, taken_over: BoolArray, step_s: float
-) -> None:
-    """Write the motion of the players that SUMO drives to `state`, in place.
-
-    `drove` [G, P] marks the players that still drive, `taken_over` [P] those that the harness drives.
-    """
-    if reading.players is None:
-        return
-    for player in np.flatnonzero(~taken_over):
-        games = np.flatnonzero(drove[:, player])
-        x, y, heading, speed = reading.players[games, player].T
-        gained = np.where(state.step[games] > 0, speed - state.speed_mps[games, player], 0.0)
-        state.acceleration_mps2[games, player] = gained / step_s
-        state.x_m[games, player], state.y_m[games, player] = x, y
-        state.heading_rad[games, player], state.speed_mps[games, player] = heading, speed

@@ -44,3 +44,16 @@ class NearbyBodies:
         standing = (*np.moveaxis(self.poses[games], -1, 0), *(each[games] for each in self._at_rest))
         columns = zip(bodies, standing, strict=True)
         return Bodies(*(np.concatenate(pair, axis=1) for pair in columns))
+
+    def columns(self, state: State, reading: Reading | None, games: IntArray) -> IntArray:
+        """[N, B] the columns of `reading` with the bodies of `of`; -1 for players and obstacles."""
+        bodies = self.of(state, reading, games)
+        columns = np.full(bodies.present.shape, -1)
+        if reading is not None and reading.present.size:
+            vehicles = Bodies(*(getattr(reading, name)[games] for name in Bodies._fields))
+            numbers = np.tile(np.arange(vehicles.present.shape[1], dtype=float), (len(games), 1))
+            players = state.present.shape[1]
+            among = Bodies(*(np.ascontiguousarray(each[:, :players]) for each in bodies))
+            numbered = among.with_nearest(vehicles._replace(length_m=numbers)).length_m[:, players:]
+            columns[:, players : players + numbered.shape[1]] = numbered
+        return columns

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
-from harness.game.human_factors import BLIND_BEHIND_M, BLIND_BESIDE_M
+from harness.game.field_of_view import SEEN_M, Eyes, in_view
 from harness.game.jit import compiled, inlined
 from harness.game.junctions import Control, Signal, StopLines
 from harness.game.meetings import Meetings
@@ -33,7 +33,6 @@ from harness.game.state import Bodies
 _EDGES = np.concatenate(([-2.5], 0.5 * (AHEAD_M[1:] + AHEAD_M[:-1]), [60.0]))  # bins of road around AHEAD_M
 _COUNT = len(AHEAD_M)
 
-SEEN_M = 120.0  # bodies farther away are not in an observation
 _NEARNESS_MPS = 10.0  # a body at a distance matters like a conflict in the time to cover it at this speed
 _LEAST_MPS = 3.0  # a slower body may start to move
 
@@ -107,8 +106,9 @@ def _observe(tables: tuple[tuple[Any, ...], ...], perceived: Perceived, moving: 
         if players.present[g, p]:
             place = on_route(players.station_m[g, p], views.offset_m[g, p], p, routes)
             heading_rad, own_mps = players.heading_rad[g, p], players.speed_mps[g, p]
-            cosine, sine, sight_m = np.cos(heading_rad), np.sin(heading_rad), min(players.sight_m[g, p], SEEN_M)
-            error, sight_cosine = players.distance_error[g, p], players.sight_cosine[g, p]
+            sight = (min(players.sight_m[g, p], SEEN_M), players.sight_cosine[g, p], players.shoulder_glance[g, p])
+            eyes: Eyes = (np.cos(heading_rad), np.sin(heading_rad), *sight, views.length_m[p], views.width_m[p])
+            error = players.distance_error[g, p]
             view[:] = 0.0
             _see_own_motion(view, players, views, (g, p))
             view[OWN.path_left_m] = -place.offset_m
@@ -128,18 +128,13 @@ def _observe(tables: tuple[tuple[Any, ...], ...], perceived: Perceived, moving: 
             for b in range(count):
                 x_m, y_m, their_heading_rad, speed_mps = _perceived_motion(perceived, g, p, b)
                 dx, dy = x_m - players.x_m[g, p], y_m - players.y_m[g, p]
-                ahead_m, distance_m = dx * cosine + dy * sine, np.hypot(dx, dy)
-                in_view = distance_m <= (sight_m if b < moving else SEEN_M)
-                if ahead_m < sight_cosine * distance_m and not players.shoulder_glance[g, p]:
-                    beside_m = abs(dy * cosine - dx * sine) - 0.5 * views.width_m[p]
-                    behind_m = -ahead_m - 0.5 * views.length_m[p]
-                    in_view = in_view and _in_mirrors(ahead_m, beside_m, behind_m)
-                urgency_s[b] = distance_m / _NEARNESS_MPS
+                urgency_s[b] = np.hypot(dx, dy) / _NEARNESS_MPS
                 if meetings.conflict[g, p, b] >= 0:
                     own_s = max(meetings.own_m[g, p, b], 0.0) / max(own_mps, _LEAST_MPS)
                     other_s = max(meetings.other_m[g, p, b], 0.0) / max(speed_mps, _LEAST_MPS)
                     urgency_s[b] = min(urgency_s[b], max(own_s, other_s))
-                seen[b] = bodies.present[g, b] and b != p and in_view and not views.hidden[g, p, b]
+                is_there = bodies.present[g, b] and b != p and not views.hidden[g, p, b]
+                seen[b] = is_there and in_view(eyes, dx, dy, b < moving)
                 if seen[b]:
                     # where the player takes it to be
                     ahead_m, left_m, frame = point_along_route(place, routes, x_m + error * dx, y_m + error * dy)
@@ -253,14 +248,6 @@ def _narrow(view: FloatArray, ends_m: tuple[float, float], left_m: float, half_w
                 view[OWN.free_left_m + k] = min(view[OWN.free_left_m + k], left_m - half_width_m)
             else:
                 view[OWN.free_right_m + k] = max(view[OWN.free_right_m + k], left_m + half_width_m)
-
-
-@compiled
-def _in_mirrors(ahead_m: float, beside_m: float, behind_m: float) -> bool:
-    """Whether mirrors show a centre that is ahead of the own centre, beside the own flank and behind the own rear."""
-    if ahead_m > 0.0:
-        return False
-    return behind_m > BLIND_BEHIND_M or beside_m > BLIND_BESIDE_M or beside_m < 0.0
 
 
 @inlined

@@ -47,7 +47,7 @@ from harness.sumo.insertion import (
     with_follower,
 )
 from harness.sumo.road_signals import Signals, SpeedLimits
-from harness.sumo.simulation import NO_SIGNALS, AtReset, Reading, Simulation, Tiles
+from harness.sumo.simulation import NO_SIGNALS, TURN_SIGNALS, AtReset, Reading, Simulation, Tiles
 
 # Options of moveToXY: keepRoute, and the distance within which SUMO looks for a lane. keepRoute's bit 2 places the car
 # exactly, on the road or off it. Its bit 1 limits the search to lanes of the car's route.
@@ -211,6 +211,11 @@ class LibsumoSimulation(Simulation):
                 return reading if players is None else replace(reading, players=players)
             texts = self._signals.texts() if self._recorded else None
             return replace(reading, players=players, signals=self._signals.read(), signal_texts=texts)
+
+    def turn_signals(self, vehicles: Sequence[tuple[int, str]]) -> list[str]:
+        with self._calls("read turn signals"):
+            codes = (libsumo.vehicle.getSignals(self._tiles.prefixes[game] + name) for game, name in vehicles)
+            return [TURN_SIGNALS[code % len(TURN_SIGNALS)] for code in codes]
 
     def close(self) -> None:
         self._release()

@@ -56,6 +56,8 @@ class AtReset(NamedTuple):
     background: Reading | None = None
 
 
+TURN_SIGNALS = ("off", "right", "left", "both")
+"""By the two lowest bits of SUMO's vehicle signals, the right and the left indicator."""
 NO_SIGNALS = AtReset(np.zeros(0, dtype=np.int8), np.zeros(0), "")
 _OF_VEHICLES = ("names", "types", "x_m", "y_m", "heading_rad", "speed_mps", "length_m", "width_m", "present")
 
@@ -171,6 +173,11 @@ class Simulation(Protocol):
 
     def step(self, x_m: FloatArray, y_m: FloatArray, heading_rad: FloatArray) -> Reading:
         """Place the players that the harness drives at poses [G, P] of their centres, step SUMO, read its vehicles."""
+        ...
+
+    def turn_signals(self, vehicles: Sequence[tuple[int, str]]) -> list[str]:
+        """The turn signals, one of `TURN_SIGNALS`, of vehicles that SUMO drives: each by its game and its name there,
+        that of a player or of a `Reading`."""
         ...
 
     def close(self) -> None:

@@ -67,7 +67,8 @@ class SubprocessSimulation(Simulation):
             self.close()
             raise
 
-    reload, reset, halt, remove, step = map(_in_the_child, ("reload", "reset", "halt", "remove", "step"))
+    reload, reset, halt, remove = map(_in_the_child, ("reload", "reset", "halt", "remove"))
+    step, turn_signals = map(_in_the_child, ("step", "turn_signals"))
 
     def close(self) -> None:
         self._finalizer()

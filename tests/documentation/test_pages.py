@@ -22,7 +22,6 @@ NOT_READ_THROUGH = re.compile(r"^ *```.*?^ *```|<!-- output of: .*?<!-- end of o
 MOST_WORDS = 1500
 LONGER = {
     "columns.md": "a table for looking up, which `harness columns` writes",
-    "egos.md": "not split yet",
 }
 LINK = re.compile(r"\]\((?![a-z]+:)([^)\s#]*)#?([^)\s]*)\)")
 each_page = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(REPOSITORY).as_posix())

@@ -321,7 +321,8 @@ def test_campaign__games_in_which_a_program_crashes_are_errors(tmp_path: Path) -
 
 
 def test_page__has_a_valid_document_of_each_kind() -> None:
-    page = "".join((REPOSITORY / "docs" / name).read_text() for name in ("egos.md", "egos-by-networks.md"))
+    pages = sorted((REPOSITORY / "docs").glob("egos*.md"))
+    page = "".join(each.read_text() for each in pages)
     blocks = [block for block in re.findall(r"```toml\n(.*?)```", page, re.DOTALL) if "kind =" in block]
     kinds = {KINDS[table["kind"]].model_validate(table).kind for table in map(tomllib.loads, blocks)}  # type: ignore[attr-defined]
     assert kinds == set(KINDS) - {"rules"}

@@ -20,7 +20,7 @@ from harness.campaign.plan.plan import plan
 from harness.campaign.preflight import open_campaign
 from harness.campaign.storage.run_folder import RunFolder
 from harness.drivers.sumo import SumoDriver
-from harness.environments.arena import read_sumo_players
+from harness.environments.sumo_players import read_sumo_players
 from harness.errors import StageFailed, UsageError
 from harness.evaluation.measured_game import METRICS_OF_PLAYERS
 from harness.evaluation.metrics import Metric

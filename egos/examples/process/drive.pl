@@ -1,5 +1,5 @@
 #!/usr/bin/env perl
-# A driver in Perl without modules: it keeps its lane and its distance. The protocol is in docs/egos.md.
+# A driver in Perl without modules: it keeps its lane and its distance. The protocol is in docs/egos-by-programs.md.
 use strict;
 use warnings;
 $| = 1;    # flush every line
@@ -24,7 +24,7 @@ sub decide {
     return sprintf '[%.6f, %.6f]', bounded(-8, $acceleration, 3), $steering;
 }
 
-# Each message is one line of JSON with the keys in the order of docs/egos.md.
+# Each message is one line of JSON with the keys in the order of docs/egos-by-programs.md.
 while (my $line = <STDIN>) {
     if ($line =~ /"type": "hello"/) {
         my ($names) = $line =~ /"layout": \[(.*?)\]/;

@@ -83,7 +83,7 @@ def drivable_area(net: Net, own: Collection[Edge] = ()) -> BaseGeometry:
     it is flat: it has the level of `own`, and roads of other levels are cut off beside them. Where two of `own` lie
     over one another, and without `own`, the levels are one area.
     """
-    edges = _near(net, own) if own else net.getEdges(withInternal=True)
+    edges = edges_near(net, own) if own else net.getEdges(withInternal=True)
     level, is_cut = _own_level(net, edges, own)
     area = surface.without_slits(surface.joined([part.shape for part in level if not part.shape.is_empty]))
     followed = [edge for edge in edges if edge in set(own)] if is_cut else edges
@@ -92,7 +92,7 @@ def drivable_area(net: Net, own: Collection[Edge] = ()) -> BaseGeometry:
 
 def passes_other_levels(net: Net, own: Collection[Edge]) -> bool:
     """Whether other roads pass over or under the edges `own` of the players' routes."""
-    return _own_level(net, _near(net, own), own)[1]
+    return _own_level(net, edges_near(net, own), own)[1]
 
 
 def _own_level(net: Net, edges: Sequence[Edge], own: Collection[Edge]) -> tuple[list[Part], bool]:
@@ -105,12 +105,13 @@ def _own_level(net: Net, edges: Sequence[Edge], own: Collection[Edge]) -> tuple[
 
 def junctions_near(net: Net, own: Collection[Edge]) -> frozenset[str] | None:
     """The junctions of the edges within `KEPT_M` of the edges `own`; None if they are all junctions of the net."""
-    nodes = {node for edge in _near(net, own) for node in (edge.getFromNode(), edge.getToNode())}
+    nodes = {node for edge in edges_near(net, own) for node in (edge.getFromNode(), edge.getToNode())}
     everything = {node for edge in net.getEdges(withInternal=False) for node in (edge.getFromNode(), edge.getToNode())}
     return None if nodes >= everything else frozenset(node.getID() for node in nodes)
 
 
-def _near(net: Net, own: Collection[Edge]) -> list[Edge]:
+def edges_near(net: Net, own: Collection[Edge]) -> list[Edge]:
+    """The edges within `KEPT_M` of the edges `own`."""
     lines = {edge: [shapely.LineString(lane_line(lane)) for lane in edge.getLanes()] for edge in net.getEdges()}
     around = shapely.union_all([line for edge in own for line in lines[edge]])
     shapely.prepare(around)
@@ -215,7 +216,7 @@ def connection_lines(net: Net, link: Connection) -> list[FloatArray]:
 def rail_lines(net: Net, area: BaseGeometry, own: Collection[Edge] = ()) -> list[FloatArray]:
     """The rails as polylines [n, 2]: the outline of the net's drivable area, found with the same `own`, without the
     openings where roads leave the scene or the area."""
-    edges = _near(net, own) if own else net.getEdges(withInternal=True)
+    edges = edges_near(net, own) if own else net.getEdges(withInternal=True)
     kept = set(edges)
     nodes = {node for edge in edges for node in (edge.getFromNode(), edge.getToNode())}
     openings = [

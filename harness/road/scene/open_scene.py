@@ -17,16 +17,16 @@ from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles
 from harness.game.seeding import between
 from harness.game.start_range import StartRange
 from harness.game.world import World
-from harness.road.demand.departures import background_departures
 from harness.road.demand.route_file import Departure, RouteFile
 from harness.road.demand.warm_up import Snapshot, snapshots
 from harness.road.net import network
 from harness.road.net.levels import heights_of_players_roads
+from harness.road.scene.cartesian_road import CartesianRoads, cartesian_roads
 from harness.road.scene.following import NO_ROAD, RoadBehind, road_behind, with_follower_type
 from harness.road.scene.footway import opened_ground
 from harness.road.scene.open_obstacles import LaneStrip, open_obstacles, strips_near, with_types
 from harness.road.scene.scene_files import read_scene
-from harness.road.scene.scene_world import edges_of_players, opened_players, start_places, world_of
+from harness.road.scene.scene_world import edges_in_use, edges_of_players, opened_players, start_places, world_of
 from harness.road.scene.start_ranges import check_starts, start_warnings
 from harness.shipped_documents import named_document
 
@@ -76,6 +76,12 @@ class OpenScene:
     def warm_up(self) -> tuple[Snapshot, ...]:
         """The background traffic with which games begin. Raises SimulationError if SUMO fails."""
         return snapshots(self.document, self.routes, self.net_file)
+
+    @cached_property
+    def cartesian_roads(self) -> CartesianRoads:
+        """The roads of the players as planners get them. They are read from the net."""
+        lines = {"edges": self.edges, "rail_lines": self.rail_lines}
+        return cartesian_roads(self.net_file, self.document, self.world, **lines)
 
     def vehicle(self, player: int) -> Departure:
         """A player's vehicle in the route file."""
@@ -160,8 +166,7 @@ def open_scene(folder: str | Path, ego_type: str | None = None) -> OpenScene:
     obstacles = open_obstacles(files, area, [player.route for player in players])
     rail_lines = tuple(network.rail_lines(net, area, own))
     routes = with_types(files.routes, obstacles)
-    background = {name for each in background_departures(files.routes, document.vehicles) for name in each.edges}
-    used = [*own, *map(net.getEdge, sorted(background))]  # background traffic needs its whole routes
+    used = edges_in_use(files, own)
     scene = OpenScene(
         folder=files.folder,
         document=document,

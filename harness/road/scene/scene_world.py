@@ -16,7 +16,7 @@ from harness.game.quantities import REACH_M
 from harness.game.road import Road, Routes
 from harness.game.start_range import StartRange
 from harness.game.world import World
-from harness.road.demand.departures import check_departures, edges_of
+from harness.road.demand.departures import background_departures, check_departures, edges_of
 from harness.road.net.levels import check_one_level
 from harness.road.net.network import rails
 from harness.road.net.own_lanes import lanes_for
@@ -35,6 +35,12 @@ def edges_of_players(files: SceneFiles) -> list[Edge]:
     vehicles = [routes.vehicles[name] for name in files.document.vehicles if name in routes.vehicles]
     found = [collect([], partial(edges_of, each, files.net, routes)) or [] for each in vehicles]
     return list(dict.fromkeys(edge for edges in found for edge in edges))
+
+
+def edges_in_use(files: SceneFiles, own: Sequence[Edge]) -> list[Edge]:
+    """The edges `own` of the players' routes, and the whole routes of the background traffic."""
+    departures = background_departures(files.routes, files.document.vehicles)
+    return [*own, *map(files.net.getEdge, sorted({name for each in departures for name in each.edges}))]
 
 
 def opened_players(
