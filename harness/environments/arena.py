@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from harness.environments.knowledge import Knowledge
 from harness.environments.nearby_bodies import NearbyBodies
 from harness.environments.seats import Seat as Seat
 from harness.environments.seats import with_walkers
@@ -21,8 +22,6 @@ from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.bicycle import Requested, move, requests
 from harness.game.human_factors import PlayersLimits, held_steering_rad, release_controls
 from harness.game.initial_state import InitialState
-from harness.game.memory import Memory
-from harness.game.observation import observe
 from harness.game.observation_layout import SIZE
 from harness.game.outcome import Outcome
 from harness.game.quantities import Quantities
@@ -110,7 +109,6 @@ class Arena(LiveSimulation):
         self._lapsed_steering_rad = np.zeros((games, players, self.world.steps))
         self._held = np.zeros((games, players), dtype=bool)
         self._course_rad: FloatArray = np.zeros((games, players))  # of players that slide
-        self._memory = Memory(games, players, self.world.step_s)
         self._limits = PlayersLimits(games, players, self.world.steps)
         self._road_steering_rad: FloatArray = np.zeros((games, players))
         self._all_games = np.arange(games)
@@ -118,6 +116,7 @@ class Arena(LiveSimulation):
         self.signal_texts = [""] * games
         """States of the traffic lights as `Reading.signal_texts`; up to date if games are recorded."""
         self.nearby = NearbyBodies(self.world, scene.obstacles, games)
+        self.knowledge = Knowledge(scene, games, (self._limits, self.nearby), self._taken_over)
 
     def reset(
         self, starts: Mapping[int, InitialState], departures: Mapping[int, list[Departure]] | None = None
@@ -136,9 +135,9 @@ class Arena(LiveSimulation):
         for _, seat, plays in self._seats_in(np.ones(self.state.present.shape, dtype=bool)):
             if seat.driver is not None:
                 seat.driver.reset(games[plays[games]])
-        self._memory.begin(self.state)
+        self.knowledge.reset(starts, self.state)
         quantities = self.first_quantities(games)
-        observation = self.observation[games] = observe(quantities)
+        observation = self.observation[games] = self._observed(quantities, games, advance=True)
         self._road_steering_rad[games] = quantities.along.road_steering_rad
         check_observation(observation, games, self.state.step)
 
@@ -263,10 +262,9 @@ class Arena(LiveSimulation):
 
         `quantities` are those before players were removed, stopped or turned along a rail in the games `changed` [N].
         """
-        if self._limits.delays:
-            self._memory.remember(self.state)
+        self.knowledge.remember(self.state)
         self._road_steering_rad = quantities.along.road_steering_rad
-        self.observation = self._seen(quantities, self._all_games)
+        self.observation = self._observed(quantities, self._all_games, advance=True)
         if len(changed):
             # Positions are unchanged: only speeds are, and which players are present.
             state = self.state.of(changed)
@@ -274,16 +272,12 @@ class Arena(LiveSimulation):
             of_games = {name: getattr(quantities, name)[changed] for name in columns}
             bodies = self.nearby.of(state, self.reading, changed)
             after = Quantities(world=self.world, state=state, bodies=bodies, **of_games)
-            self.observation[changed] = self._seen(after, changed)
+            self.observation[changed] = self._observed(after, changed)
             self._road_steering_rad = self._road_steering_rad.copy()
             self._road_steering_rad[changed] = after.along.road_steering_rad
 
-    def _seen(self, quantities: Quantities, games: IntArray) -> FloatArray:
-        """[N, P, SIZE] the observations of games [N] with these quantities."""
-        if not self._limits.delays:
-            return observe(quantities)
-        lags = self._limits.lags(self.state.step)[games]
-        return observe(quantities, self._memory.perceived(quantities.bodies, lags, games))
+    def _observed(self, quantities: Quantities, games: IntArray, *, advance: bool = False) -> FloatArray:
+        return self.knowledge.observations(quantities, self.state.step, self.reading, games, advance=advance)
 
     # --- observations ------------------------------------------------------------------------------------
 

@@ -77,20 +77,30 @@ class _Views(NamedTuple):
 _columns = attrgetter(*_Players._fields)  # plain tuples: numba takes them apart three times as fast as records
 
 
-def observe(q: Quantities, perceived: Perceived | None = None) -> FloatArray:
-    """[G, P, SIZE] float32 in [-1, 1]: the players' observations; zeros for players that are not present. `perceived`:
-    the bodies as the players take them to be; left out: as they are."""
+class Seen(NamedTuple):
+    """The bodies as the players take them to be. Bodies after those of the game are ghosts."""
+
+    bodies: Bodies
+    motion: Perceived
+    hidden: BoolArray
+    """[G, P, B]"""
+    meetings: Meetings
+
+
+def observe(q: Quantities, seen: Seen | None = None) -> FloatArray:
+    """[G, P, SIZE] float32 in [-1, 1]: the players' observations; zeros for players that are not present. `seen`: the
+    bodies as the players take them to be; left out: as they are."""
     world, rules, along = q.world, q.rules, q.along
+    if seen is None:
+        seen = Seen(q.bodies, as_they_are(q.bodies, q.state.present.shape[1]), q.hidden, q.meetings)
     views = (  # the columns of `_Views`
         *(q.lateral_offset_m, rules.next_line, rules.posted_mps),
-        *(along.speed_limit_mps, along.road_steering_rad, along.lane_end_m, along.goal_m, q.hidden),
+        *(along.speed_limit_mps, along.road_steering_rad, along.lane_end_m, along.goal_m, seen.hidden),
         *(world.actuators.max_steering_rad, world.length_m, world.width_m),
     )
-    records = (q.bodies, world.road.routes, world.right_of_way.stop_lines, q.meetings)
-    if perceived is None:
-        perceived = as_they_are(q.bodies, q.state.present.shape[1])
+    records = (seen.bodies, world.road.routes, world.right_of_way.stop_lines, seen.meetings)
     moving = q.bodies.present.shape[1] - len(world.hiding.obstacles)
-    return _observe((_columns(q.state), views, *map(tuple, records)), perceived, moving)
+    return _observe((_columns(q.state), views, *map(tuple, records)), seen.motion, moving)
 
 
 @compiled
