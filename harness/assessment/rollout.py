@@ -117,8 +117,6 @@ class _Rollout:
         self._arm, self._on_start, self._start_from = arm, on_start, start_from
         factors, shares = [factors_of(each) for each in arm.drivers], [shares_of(each) for each in arm.drivers]
         self._starts = arm.scene.start_distribution(factors, [1.0] * len(factors), shares)
-        self._steers = [driver is not None and driver.takes_over for driver in arm.drivers]
-        self._shields = arm.shields
         self._apart = _drivers_apart(arm)
         self._alone: Arena | None = None
 
@@ -163,7 +161,7 @@ class _Rollout:
 
     def _play(self, arena: Arena, starts: Mapping[int, InitialState]) -> dict[int, Game]:
         """Play games from their starts, as many at a time as the arena has tiles."""
-        traces, waiting = GameTraces(self._arm.scene, arena, self._steers, self._shields), deque(starts)
+        traces, waiting = GameTraces(self._arm, arena), deque(starts)
         free, episode_of, played = list(range(arena.games)), dict[int, int](), dict[int, Game]()
         while waiting or episode_of:
             begun = [free.pop() for _ in range(min(len(free), len(waiting)))]

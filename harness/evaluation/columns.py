@@ -26,6 +26,7 @@ from harness.evaluation.falsification_columns import FALSIFICATION, SEARCHES
 from harness.evaluation.league_columns import LEAGUE_MEASURES, LEAGUE_PAIRING, LEAGUE_RANKS
 from harness.evaluation.measured_game import METRICS_OF_CONDUCT, METRICS_OF_GAMES, METRICS_OF_PLAYERS
 from harness.evaluation.over_trainings_columns import OVER_TRAININGS
+from harness.evaluation.perception_columns import PERCEPTION
 from harness.evaluation.preventability_columns import PREVENTABILITY, REFERENCE_DRIVERS, TAKEOVERS
 from harness.evaluation.selection_columns import SELECTIONS
 from harness.evaluation.severity.closeness import CRITERIA
@@ -34,6 +35,7 @@ from harness.evaluation.shield_columns import SHIELDS
 _T = "95 % t interval"
 _PAPER = "the paper, section 4.2"
 ARM = Column("arm", TEXT, "The name of the arm, such as naive_vs_speedy.")
+_ERROR_FREE_ARM = Column("error_free_arm", TEXT, "The same without the perception errors.")
 _SHIELDED_ARM = replace(ARM, name="shielded_arm", meaning="The same with the shield.")
 PERSONA = Column("persona", TEXT, "The persona of the non-ego; of an arm with one.")
 SEED = Column("seed", COUNT, "The training seed.")
@@ -229,6 +231,7 @@ _TABLES = {
     ),
     "selections": (PERSONA, SEED, *SELECTIONS),
     "shields": (ARM, _SHIELDED_ARM, PERSONA, SEED, *_PAIRS, *SHIELDS),
+    "perception": (ARM, _ERROR_FREE_ARM, PERSONA, SEED, *_PAIRS, *PERCEPTION),
     "populations": (
         ARM,
         Column("population", TEXT, "The population that drove against the ego."),

@@ -39,7 +39,7 @@ class RecordedGame:
     """A game from its trace, the constants of its scene, and the vehicle types (SUMO's default without an entry)."""
 
     trace: pd.DataFrame
-    """Columns of `trace_file.SCHEMA` or `SHIELDED_SCHEMA`."""
+    """Columns of a schema of `trace_file.schema_of`."""
     world: World
     kinds: Mapping[str, BodyKind]
 
@@ -116,6 +116,12 @@ class RecordedGame:
         if "shielded" not in self.trace.columns:
             return None
         return self._filled("shielded")[:, : len(self.world.roles)]
+
+    def perceived(self, column: str) -> BoolArray | None:
+        """[T, P] where a column of `trace_columns.PERCEIVED` says something; None: the arm has no perception errors."""
+        if column not in self.trace.columns:
+            return None
+        return self._filled("", self.trace[column].to_numpy() != "")[:, : len(self.world.roles)]
 
     @cached_property
     def payoff(self) -> FloatArray:

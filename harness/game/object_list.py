@@ -67,6 +67,7 @@ class ObjectLists:
         kept = self._sensing.latency_steps + 1
         self._draws = np.zeros((games, _ROOM, steps, 4))
         self._lost: BoolArray = np.zeros((games, _ROOM), dtype=bool)
+        self._missed: BoolArray = np.zeros((games, _ROOM), dtype=bool)  # lost, and else in the list
         self._known: BoolArray = np.zeros((games, _ROOM), dtype=bool)
         self._motion = np.zeros((kept, 4, games, _ROOM))
         self._listed: BoolArray = np.zeros((kept, games, _ROOM), dtype=bool)
@@ -80,7 +81,7 @@ class ObjectLists:
         """Begin a game whose random numbers these parts name."""
         self._names[game].clear()
         self._parts[game] = parts
-        self._known[game] = self._lost[game] = False
+        self._known[game] = self._lost[game] = self._missed[game] = False
         self._listed[:, game] = False
         self._ghost[game] = 0.0
         if self._errors.ghosts is not None:
@@ -103,15 +104,14 @@ class ObjectLists:
         state = q.state
         ego = (state.x_m[:, EGO], state.y_m[:, EGO], state.heading_rad[:, EGO])
         when = (games, state.step, np.minimum(state.step, self._steps - 1))
-        memory = (self._draws, self._lost, self._motion, self._listed)
+        memory = (self._draws, (self._lost, self._missed), self._motion, self._listed)
         _sense(self._sensing, tuple(q.bodies), numbers, (ego, when), memory, (perceived, hidden))
         seen = Seen(bodies=q.bodies, motion=perceived, hidden=hidden, meetings=q.meetings)
         return seen if self._errors.ghosts is None else self._with_ghosts(seen, q, games)
 
-    def lost(self, game: int, names: Sequence[str]) -> list[str]:
-        """The names of those bodies that are lost."""
-        numbers = self._names[game]
-        return [each for each in names if each in numbers and self._lost[game, numbers[each]]]
+    def lost(self, game: int) -> list[str]:
+        """The names of the objects that are not in the list of this step because they are lost."""
+        return [name for name, number in self._names[game].items() if self._missed[game, number]]
 
     def ghosts(self, game: int, step: int) -> list[tuple[float, float, float, float]]:
         """x_m, y_m, heading_rad and speed_mps of the ghosts of a game in this step."""
@@ -138,7 +138,7 @@ class ObjectLists:
         self._draws[game, number] = draw_object(self._errors, self._steps, step_s, name, *self._parts[game])
 
     def _grow(self) -> None:
-        for name, axis in (("_draws", 1), ("_lost", 1), ("_known", 1), ("_motion", 3), ("_listed", 2)):
+        for name, axis in (("_draws", 1), ("_lost", 1), ("_missed", 1), ("_known", 1), ("_motion", 3), ("_listed", 2)):
             array = getattr(self, name)
             setattr(self, name, np.concatenate((array, np.zeros_like(array)), axis=axis))
 
@@ -201,14 +201,10 @@ def _lose_and_find(
     where: tuple[Any, ...],
     memory: tuple[FloatArray, BoolArray, BoolArray],
 ) -> None:
-    """Change `lost` [G, N] in place by the draws of this step. An object that is met for the first time is lost with the
-    long-run share of time in which such an object is."""
-    sensing, bodies, (ego, (games, steps)), (draws, lost, known) = (
-        _Sensing(*parameters),
-        Bodies(*columns),
-        where,
-        memory,
-    )
+    """Change `lost` [G, N] in place by the draws of this step. An object that is met for the first time is lost with
+    the long-run share of time in which such an object is."""
+    sensing, bodies = _Sensing(*parameters), Bodies(*columns)
+    (ego, (games, steps)), (draws, lost, known) = where, memory
     for row in range(len(games)):
         g = games[row]
         for b in range(numbers.shape[1]):
@@ -233,12 +229,12 @@ def _sense(
     columns: tuple[Any, ...],
     numbers: IntArray,
     where: tuple[Any, ...],
-    memory: tuple[FloatArray, BoolArray, FloatArray, BoolArray],
+    memory: tuple[FloatArray, tuple[BoolArray, BoolArray], FloatArray, BoolArray],
     result: tuple[FloatArray, BoolArray],
 ) -> None:
-    """Write the lists of this step, and what the ego knows of each body by the list that has reached it: its motion, and
-    whether it is hidden."""
-    sensing, bodies, (draws, lost, motion, listed) = _Sensing(*parameters), Bodies(*columns), memory
+    """Write the lists of this step, and what the ego knows of each body by the list that has reached it: its motion,
+    and whether it is hidden."""
+    sensing, bodies, (draws, (lost, missed), motion, listed) = _Sensing(*parameters), Bodies(*columns), memory
     ((x_m, y_m, heading_rad), (games, steps, drawn)), (perceived, hidden) = where, result
     kept = len(listed)
     position_sd, position_sd_per_m = sensing.position
@@ -247,6 +243,7 @@ def _sense(
         g, now = games[row], steps[row] % kept
         then = (steps[row] - min(sensing.latency_steps, steps[row])) % kept
         listed[now, g, :] = False
+        missed[g, :] = False
         for b in range(numbers.shape[1]):
             n = numbers[row, b]
             if n < 0 or not bodies.present[row, b]:
@@ -254,7 +251,8 @@ def _sense(
             dx, dy = bodies.x_m[row, b] - x_m[row], bodies.y_m[row, b] - y_m[row]
             distance_m, ahead_m = np.hypot(dx, dy), dx * np.cos(heading_rad[row]) + dy * np.sin(heading_rad[row])
             in_view = distance_m <= sensing.range_m and ahead_m >= sensing.cosine * distance_m
-            listed[now, g, n] = in_view and not hidden[row, EGO, b] and not lost[g, n]
+            in_view = in_view and not hidden[row, EGO, b]
+            listed[now, g, n], missed[g, n] = in_view and not lost[g, n], in_view and lost[g, n]
             motion[now, 0, g, n], motion[now, 1, g, n] = bodies.x_m[row, b], bodies.y_m[row, b]
             motion[now, 2, g, n], motion[now, 3, g, n] = bodies.heading_rad[row, b], bodies.speed_mps[row, b]
             sd_m, sd_mps = position_sd + position_sd_per_m * distance_m, speed_sd + speed_sd_per_m * distance_m

@@ -79,8 +79,8 @@ class GhostPlan:
 
 
 def draw_object(errors: PerceptionErrors, steps: int, step_s: float, name: str, *parts: str | int) -> FloatArray:
-    """[T, 4] the random numbers of an object in a game of T steps: `LOSS` is uniform, the others are normal processes of
-    variance 1."""
+    """[T, 4] the random numbers of an object in a game of T steps: `LOSS` is uniform, the others are normal processes
+    of variance 1."""
     generator = generator_of(*parts, "perception", name)
     uniform, normal = generator.random((steps, 1)), generator.standard_normal((steps, 3))
     position, speed = (np.exp(-step_s / each.persistence_s) for each in (errors.position, errors.speed))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -126,17 +127,17 @@ def test_object_list__objects_are_lost_for_the_share_of_the_rates(
 def lists_lost(q: Quantities, episode: int) -> bool:
     made = lists(PerceptionErrors(losses=LOSSES), episode)
     seen = look(made, q)
-    assert made.lost(0, ["ego", "non_ego"]) == ([] if is_seen(seen) else ["non_ego"])
+    assert made.lost(0) == ([] if is_seen(seen) else ["non_ego"])
     return not is_seen(seen)
 
 
 def test_object_list__an_object_is_lost_and_found_at_its_rates(merge: OpenScene, moment: Moment) -> None:
-    """In a step of 0.1 s, with 2 losses per second of 0.25 s each: lost with 1 - exp(-0.2), found with 1 - exp(-0.4)."""
+    """In 0.1 s, with 2 losses per second of 0.25 s each: lost with 1 - exp(-0.2), found with 1 - exp(-0.4)."""
     q, before_after = moment(merge.world, [car(100.0), car(120.0)]), list[tuple[bool, bool]]()
     for episode in range(150):
         made = lists(PerceptionErrors(losses=((0.0, 120.0, 0.25),)), episode)
         there = [is_seen(look(made, q, step)) for step in range(STEPS)]
-        before_after += zip(there, there[1:], strict=False)
+        before_after += pairwise(there)
     was, stays = np.array(before_after).T
     assert 1.0 - stays[was].mean() == pytest.approx(1.0 - np.exp(-0.2), abs=0.04)
     assert stays[~was].mean() == pytest.approx(1.0 - np.exp(-0.4), abs=0.06)
