@@ -42,6 +42,7 @@ SECTIONS = {
         "competence",
         "attribution",
         "preventability",
+        "perception",
         "falsification",
         "manoeuvres",
         "manoeuvre-numbers",

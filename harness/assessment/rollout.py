@@ -177,7 +177,8 @@ class _Rollout:
             for tile in [each for each in episode_of if not runs[each].any()]:
                 episode = episode_of.pop(tile)
                 outcomes = [Outcome(outcome) for outcome in arena.state.outcome[tile].tolist()]
-                cells, trace = _played(self._arm, episode, outcomes, ""), traces.end(tile, episode)
+                cells = _played(self._arm, episode, outcomes, "") | self._weather(starts[episode])
+                trace = traces.end(tile, episode)
                 played[episode] = Game(played=cells, trace=trace, scene=self._arm.scene)
                 free.append(tile)
         return played
@@ -186,6 +187,13 @@ class _Rollout:
         present = [float(each) for each in self._arm.present_in(episode)]
         parts = parts_of(self._arm.seed, episode)
         return self._start_from(draw_initial_state(replace(self._starts, present_share=present), *parts))
+
+    def _weather(self, start: InitialState) -> dict[str, float]:
+        """What the scene varies of it, in one game."""
+        varies = self._arm.scene.document.varies
+        return {
+            name: getattr(start, name) for name in ("friction", "visibility_m") if getattr(varies, name) is not None
+        }
 
     def _departures(self, episode: int) -> list[Departure]:
         return self._arm.scene.departures(generator_of(*parts_of(self._arm.seed, episode), "others"))

@@ -60,8 +60,8 @@ class PositionNoise(Document):
 
     sd_m: float = Field(0.0, ge=0.0, le=10.0)
     """Standard deviation at the ego."""
-    sd_per_m: float = Field(0.0, ge=0.0, le=0.5)
-    """What is added to it per metre of distance."""
+    sd_share: float = Field(0.0, ge=0.0, le=0.5)
+    """What is added to it, as a share of the distance. 0.01 is 0.5 m at 50 m."""
     persistence_s: float = Field(1.0, ge=0.01, le=600.0)
     """Correlation time."""
 
@@ -71,8 +71,8 @@ class SpeedNoise(Document):
 
     sd_mps: float = Field(0.0, ge=0.0, le=20.0)
     """Standard deviation at the ego."""
-    sd_mps_per_m: float = Field(0.0, ge=0.0, le=1.0)
-    """What is added to it per metre of distance."""
+    sd_per_s: float = Field(0.0, ge=0.0, le=1.0)
+    """What is added to it, per distance. 0.01 is 0.5 m/s at 50 m."""
     persistence_s: float = Field(1.0, ge=0.01, le=600.0)
     """Correlation time."""
 
@@ -120,7 +120,7 @@ class EgoPerception(Document):
             field_of_view_rad=float(np.deg2rad(self.field_of_view_deg)),
             latency_s=self.latency_s,
             losses=tuple((each.distance_m, each.losses_per_min, each.mean_duration_s) for each in self.loss),
-            position=game.Noise(sd=position.sd_m, sd_per_m=position.sd_per_m, persistence_s=position.persistence_s),
-            speed=game.Noise(sd=speed.sd_mps, sd_per_m=speed.sd_mps_per_m, persistence_s=speed.persistence_s),
+            position=game.Noise(sd=position.sd_m, sd_per_m=position.sd_share, persistence_s=position.persistence_s),
+            speed=game.Noise(sd=speed.sd_mps, sd_per_m=speed.sd_per_s, persistence_s=speed.persistence_s),
             ghosts=None if ghosts is None else game.Ghosts(**ghosts.model_dump()),
         )

@@ -286,7 +286,8 @@ class Arena(LiveSimulation):
         state.x_m[game], state.y_m[game], state.heading_rad[game] = start.x_m, start.y_m, start.heading_rad
         state.speed_mps[game], state.present[game] = start.speed_mps, start.present
         state.station_m[game] = start.station_m
-        state.friction[game], state.limit_share[game] = start.friction, start.limit_share
+        state.friction[game], state.visibility_m[game] = start.friction, start.visibility_m
+        state.limit_share[game] = start.limit_share
         state.acceleration_mps2[game] = state.steering_rad[game] = 0.0
         state.shoulder_glance[game], self._member[game] = start.shoulder_glance, start.member
         state.outcome[game], state.lapsed[game], state.step[game] = _RUNNING, False, 0

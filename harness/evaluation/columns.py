@@ -43,6 +43,10 @@ EPISODE = Column("episode", COUNT, "The game. Equal numbers begin alike in every
 _GAME = (ARM, PERSONA, SEED, EPISODE)
 _EGO_FAILED = Column("ego_failed", MAYBE, "1 if the ego did not reach its goal, else 0.", source="the paper, section 4")
 _ERROR = Column("error", TEXT, "Why the game could not be played; empty if it was.")
+_WEATHER = (
+    Column("friction", NUMBER, "Coefficient of friction of the road, of a scene that varies it.", optional=True),
+    Column("visibility_m", NUMBER, "Distance up to which players see, of a scene that varies it.", optional=True),
+)
 _PLAYER = Column("player", TEXT, "`ego`, `non_ego`, `non_ego_2` and so on.")
 _EPISODES = Column("episodes", COUNT, "Games of the arm.", label="games")
 _PAIRS = (
@@ -125,9 +129,10 @@ _TABLES = {
         *(_outcome("non_ego", "person"), *_of_player("non_ego", "person")),
         Column("duration_s", NUMBER, "Duration of the game."),
         *(each.column for each in METRICS_OF_GAMES),
+        *_WEATHER,
         _ERROR,
     ),
-    "played": (*_GAME, _outcome("ego", "ego"), _outcome("non_ego", "person"), _ERROR),
+    "played": (*_GAME, _outcome("ego", "ego"), _outcome("non_ego", "person"), *_WEATHER, _ERROR),
     "causes": (
         *_GAME,
         _outcome("ego", "ego"),

@@ -20,6 +20,7 @@ from harness.game.geometry import Box, box_distance
 from harness.game.junctions import SIGNALS, Signal
 from harness.game.outcome import Outcome
 from harness.game.quantities import Quantities
+from harness.game.roles import EGO
 from harness.game.state import NEAREST, NOTICED_M, Bodies, PlayersMotion, State
 from harness.game.traffic_rules import since_change_s
 from harness.game.world import World
@@ -122,6 +123,13 @@ class RecordedGame:
         if column not in self.trace.columns:
             return None
         return self._filled("", self.trace[column].to_numpy() != "")[:, : len(self.world.roles)]
+
+    def lost_by_ego(self, body: int) -> BoolArray:
+        """[T] whether the ego's perception has lost a body."""
+        if "ego_lost" not in self.trace.columns:
+            return np.zeros(len(self._present), dtype=bool)
+        lost = self._filled("ego_lost")[:, EGO]
+        return np.array([self.names[body] in str(names).split() for names in lost], dtype=bool)
 
     @cached_property
     def payoff(self) -> FloatArray:

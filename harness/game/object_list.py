@@ -74,6 +74,7 @@ class ObjectLists:
         self._names = [dict[str, int]() for _ in range(games)]
         self._parts = [tuple[str | int, ...]() for _ in range(games)]
         self._ghosts = [GhostPlan(*np.zeros((3, 0)), np.zeros((0, 3)))] * games
+        self._next_ghost = np.tile((0, steps + 1), (games, 1))  # its number in the plan, and its first step
         self._ghost: FloatArray = np.zeros((games, MOST_GHOSTS, 5))
         """x_m, y_m, heading_rad, speed_mps, and the step in which it goes."""
 
@@ -86,6 +87,7 @@ class ObjectLists:
         self._ghost[game] = 0.0
         if self._errors.ghosts is not None:
             self._ghosts[game] = draw_ghosts(self._errors.ghosts, self._steps, self._sensing.step_s, *parts)
+            self._next_ghost[game] = 0, self._first_step(game, 0)
 
     def advance(self, q: Quantities, names: Sequence[Sequence[str]], games: IntArray) -> None:
         """Objects of games [N] are lost and found, and ghosts appear. Once per step. `names` [N][B] are those of the
@@ -95,15 +97,15 @@ class ObjectLists:
         of_game = (games, np.minimum(q.state.step, self._steps - 1))
         memory = (self._draws, self._lost, self._known)
         _lose_and_find(self._sensing, tuple(q.bodies), numbers, (ego, of_game), memory)
-        for row, game in enumerate(games.tolist() if self._errors.ghosts is not None else ()):
-            self._haunt(game, int(q.state.step[row]), q, row)
+        if self._errors.ghosts is not None:
+            self._haunt(q, games)
 
     def seen(self, q: Quantities, perceived: Perceived, names: Sequence[Sequence[str]], games: IntArray) -> Seen:
         """What the players of games [N] take the bodies to be: the ego by its list, the others as in `perceived`."""
         numbers, perceived, hidden = self._numbers(names, games), perceived.copy(), q.hidden.copy()
         state = q.state
         ego = (state.x_m[:, EGO], state.y_m[:, EGO], state.heading_rad[:, EGO])
-        when = (games, state.step, np.minimum(state.step, self._steps - 1))
+        when = (games, state.step, np.minimum(state.step, self._steps - 1), state.visibility_m)
         memory = (self._draws, (self._lost, self._missed), self._motion, self._listed)
         _sense(self._sensing, tuple(q.bodies), numbers, (ego, when), memory, (perceived, hidden))
         seen = Seen(bodies=q.bodies, motion=perceived, hidden=hidden, meetings=q.meetings)
@@ -142,18 +144,31 @@ class ObjectLists:
             array = getattr(self, name)
             setattr(self, name, np.concatenate((array, np.zeros_like(array)), axis=axis))
 
-    def _haunt(self, game: int, step: int, q: Quantities, row: int) -> None:
-        """Move the ghosts of a game by a step, and let those of this step appear."""
-        ghost, plan, moved_m = self._ghost[game], self._ghosts[game], self._sensing.step_s * self._ghost[game, :, 3]
-        ghost[:, 0] += moved_m * np.cos(ghost[:, 2])
-        ghost[:, 1] += moved_m * np.sin(ghost[:, 2])
-        heading_rad = q.state.heading_rad[row, EGO]
+    def _haunt(self, q: Quantities, games: IntArray) -> None:
+        """Move the ghosts of games [N] by a step, and let those of this step appear."""
+        heading_rad, moved_m = self._ghost[games, :, 2], self._sensing.step_s * self._ghost[games, :, 3]
+        self._ghost[games, :, 0] += moved_m * np.cos(heading_rad)
+        self._ghost[games, :, 1] += moved_m * np.sin(heading_rad)
+        for row in np.flatnonzero(self._next_ghost[games, 1] <= q.state.step).tolist():
+            game = int(games[row])
+            while self._next_ghost[game, 1] <= q.state.step[row]:
+                number = int(self._next_ghost[game, 0])
+                self._appear(game, number, q, row)
+                self._next_ghost[game] = number + 1, self._first_step(game, number + 1)
+
+    def _first_step(self, game: int, number: int) -> int:
+        """When a ghost of the plan appears; after the game where there are no more."""
+        first_steps = self._ghosts[game].first_step
+        return int(first_steps[number]) if number < len(first_steps) else self._steps + 1
+
+    def _appear(self, game: int, number: int, q: Quantities, row: int) -> None:
+        plan, state = self._ghosts[game], q.state
+        ahead_m, left_m, speed_mps = plan.pose[number]
+        heading_rad = state.heading_rad[row, EGO]
         cosine, sine = np.cos(heading_rad), np.sin(heading_rad)
-        for k in np.flatnonzero(plan.first_step == step).tolist():
-            ahead_m, left_m, speed_mps = plan.pose[k]
-            x_m = q.state.x_m[row, EGO] + ahead_m * cosine - left_m * sine
-            y_m = q.state.y_m[row, EGO] + ahead_m * sine + left_m * cosine
-            ghost[int(plan.place[k])] = x_m, y_m, heading_rad, speed_mps, plan.end_step[k]
+        x_m = state.x_m[row, EGO] + ahead_m * cosine - left_m * sine
+        y_m = state.y_m[row, EGO] + ahead_m * sine + left_m * cosine
+        self._ghost[game, int(plan.place[number])] = x_m, y_m, heading_rad, speed_mps, plan.end_step[number]
 
     def _with_ghosts(self, seen: Seen, q: Quantities, games: IntArray) -> Seen:
         """The same with the ghosts after the bodies, which the ego alone sees. No rule gives a ghost priority."""
@@ -235,7 +250,7 @@ def _sense(
     """Write the lists of this step, and what the ego knows of each body by the list that has reached it: its motion,
     and whether it is hidden."""
     sensing, bodies, (draws, (lost, missed), motion, listed) = _Sensing(*parameters), Bodies(*columns), memory
-    ((x_m, y_m, heading_rad), (games, steps, drawn)), (perceived, hidden) = where, result
+    ((x_m, y_m, heading_rad), (games, steps, drawn, visibility_m)), (perceived, hidden) = where, result
     kept = len(listed)
     position_sd, position_sd_per_m = sensing.position
     speed_sd, speed_sd_per_m = sensing.speed
@@ -250,7 +265,7 @@ def _sense(
                 continue
             dx, dy = bodies.x_m[row, b] - x_m[row], bodies.y_m[row, b] - y_m[row]
             distance_m, ahead_m = np.hypot(dx, dy), dx * np.cos(heading_rad[row]) + dy * np.sin(heading_rad[row])
-            in_view = distance_m <= sensing.range_m and ahead_m >= sensing.cosine * distance_m
+            in_view = distance_m <= min(sensing.range_m, visibility_m[row]) and ahead_m >= sensing.cosine * distance_m
             in_view = in_view and not hidden[row, EGO, b]
             listed[now, g, n], missed[g, n] = in_view and not lost[g, n], in_view and lost[g, n]
             motion[now, 0, g, n], motion[now, 1, g, n] = bodies.x_m[row, b], bodies.y_m[row, b]

@@ -56,6 +56,7 @@ class _Players(NamedTuple):
     closing_error_per_s: FloatArray
     signals: IntArray
     signal_s: FloatArray
+    visibility_m: FloatArray
 
 
 class _Views(NamedTuple):
@@ -117,7 +118,7 @@ def _observe(tables: tuple[tuple[Any, ...], ...], perceived: Perceived, moving: 
         if players.present[g, p]:
             place = on_route(players.station_m[g, p], views.offset_m[g, p], p, routes)
             heading_rad, own_mps = players.heading_rad[g, p], players.speed_mps[g, p]
-            cosine, sine, sight_m = np.cos(heading_rad), np.sin(heading_rad), min(players.sight_m[g, p], SEEN_M)
+            cosine, sine, reach_m = np.cos(heading_rad), np.sin(heading_rad), min(players.visibility_m[g], SEEN_M)
             error, sight_cosine = players.distance_error[g, p], players.sight_cosine[g, p]
             view[:] = 0.0
             _see_own_motion(view, players, views, (g, p))
@@ -139,7 +140,7 @@ def _observe(tables: tuple[tuple[Any, ...], ...], perceived: Perceived, moving: 
                 x_m, y_m, their_heading_rad, speed_mps = _perceived_motion(perceived, g, p, b)
                 dx, dy = x_m - players.x_m[g, p], y_m - players.y_m[g, p]
                 ahead_m, distance_m = dx * cosine + dy * sine, np.hypot(dx, dy)
-                in_view = distance_m <= (sight_m if b < moving else SEEN_M)
+                in_view = distance_m <= (min(players.sight_m[g, p], reach_m) if b < moving else reach_m)
                 if ahead_m < sight_cosine * distance_m and not players.shoulder_glance[g, p]:
                     beside_m = abs(dy * cosine - dx * sine) - 0.5 * views.width_m[p]
                     behind_m = -ahead_m - 0.5 * views.length_m[p]

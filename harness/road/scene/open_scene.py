@@ -134,6 +134,7 @@ class OpenScene:
             step_s=self.world.step_s,
             routes=self.world.road.routes,
             friction=varies.friction or (self.document.friction, self.document.friction),
+            visibility_m=varies.visibility_m or (self.document.visibility_m, self.document.visibility_m),
             limit_share=varies.speed_limit_share or (1.0, 1.0),
             signal_place=varies.signal_place or (0.0, 1.0),
             along_route_share=along_route_share,
