@@ -12,7 +12,7 @@ from typing import Literal
 
 from harness.errors import UsageError, name_like
 
-Kind = Literal["networks", "personas", "egos", "policies", "campaigns"]
+Kind = Literal["networks", "personas", "egos", "perception", "policies", "campaigns"]
 """The folders of documents."""
 
 PACKAGE = Path(__file__).resolve().parent
@@ -23,6 +23,7 @@ _ONE_OF: dict[Kind, str] = {
     "networks": "scene",
     "personas": "persona",
     "egos": "ego",
+    "perception": "perception document",
     "policies": "folder of policies",
     "campaigns": "campaign",
 }

@@ -48,6 +48,7 @@ SECTIONS = {
         "competence",
         "attribution",
         "preventability",
+        "perception",
         "falsification",
         "manoeuvres",
         "manoeuvre-numbers",

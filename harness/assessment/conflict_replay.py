@@ -12,7 +12,7 @@ A human driver would not have followed a course that reacts to nothing either: t
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -84,7 +84,8 @@ class ConflictReplay:
     """Replays of the collisions of one arm and training seed."""
 
     def __init__(self, scene: OpenScene, collisions: Sequence[Collision], seed: int) -> None:
-        self._scene, self._collisions, self._seed = scene, collisions, seed
+        self._scene = replace(scene, perception_errors=None)  # reference drivers see what is there
+        self._collisions, self._seed = collisions, seed
         self._car: Car = car_of(scene.world, EGO)
         self._lane_width_m = lane_width_of(scene.world)
 

@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.drivers.shield import ShieldedDriver
+from harness.assessment.seated_arm import SeatedArm
 from harness.environments.arena import Arena, Step
-from harness.evaluation.trace_file import SCHEMA, SHIELDED_SCHEMA
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.outcome import Outcome
+from harness.game.roles import EGO
 from harness.game.state import State
-from harness.road.scene.open_scene import OpenScene
 from harness.sumo.simulation import Reading
 
 _POSE = ("x_m", "y_m", "heading_rad")
@@ -37,6 +36,8 @@ class _Frame:
     """[G, P]"""
     shielded: BoolArray
     """[G, P] whether a player's shield changed its decision in the step."""
+    perceived: dict[str, list[str]]
+    """[G] what the ego lost and which ghosts it sees, by column; empty without perception errors."""
     reading: Reading | None
     signal_texts: tuple[str, ...]
 
@@ -44,16 +45,13 @@ class _Frame:
 class GameTraces:
     """Writes down the games of an arena, which may be reset one after the other."""
 
-    def __init__(
-        self, scene: OpenScene, arena: Arena, steers: Sequence[bool], shields: Sequence[ShieldedDriver | None]
-    ) -> None:
-        """`steers` [P]: whether the harness moves a player; `shields` [P]: its shield, which has a column if there is
-        one."""
+    def __init__(self, arm: SeatedArm, arena: Arena) -> None:
+        scene, steers = arm.scene, [driver is not None and driver.takes_over for driver in arm.drivers]
         self._scene, self._arena = scene, arena
         self._roles = np.array(scene.world.roles, dtype=object)
         self._types = np.array([scene.vehicle(player).vehicle_type for player in range(len(steers))], dtype=object)
-        self._steers, self._shields = np.array(steers, dtype=bool), shields
-        self._names = (SHIELDED_SCHEMA if any(shields) else SCHEMA).names
+        self._steers, self._shields = np.array(steers, dtype=bool), arm.shields
+        self._names = arm.trace_schema.names
         self._frames: dict[int, list[_Frame]] = {}
 
     def begin(self, games: Sequence[int]) -> None:
@@ -70,7 +68,7 @@ class GameTraces:
             frames.append(frame)
 
     def end(self, game: int, episode: int) -> dict[str, list[Any]]:
-        """End a game, before it is reset: its trace, as columns of `SCHEMA` or `SHIELDED_SCHEMA`."""
+        """End a game, before it is reset: its trace, as columns of the arm's `trace_schema`."""
         frames = self._frames.pop(game)
         of_player, players = self._players(game, frames)
         of_other, others = self._others(game, frames)
@@ -115,9 +113,21 @@ class GameTraces:
             present=present.copy(),
             payoff=payoff,
             shielded=shielded,
+            perceived=self._perceived(state),
             reading=arena.reading,
             signal_texts=tuple(arena.signal_texts),
         )
+
+    def _perceived(self, state: State) -> dict[str, list[str]]:
+        lists = self._arena.knowledge.object_lists
+        if lists is None:
+            return {}
+        games = enumerate(state.step.tolist())
+        shown = [(lists.lost(game), lists.ghosts(game, step)) for game, step in games]
+        return {
+            "ego_lost": [" ".join(lost) for lost, _ in shown],
+            "ego_ghosts": ["; ".join(" ".join(map(repr, ghost)) for ghost in ghosts) for _, ghosts in shown],
+        }
 
     def _players(self, game: int, frames: Sequence[_Frame]) -> tuple[IntArray, dict[str, NDArray]]:
         """The steps [n] of the players' rows, and their columns [n]."""
@@ -127,6 +137,10 @@ class GameTraces:
             return np.array(values)[steps, players]
 
         columns = {name: rows([getattr(frame.state, name)[game] for frame in frames]) for name in (*_MOTION, "lapsed")}
+        for name in frames[0].perceived:
+            texts = np.full((len(frames), len(self._roles)), "", dtype=object)
+            texts[:, EGO] = [frame.perceived[name][game] for frame in frames]
+            columns[name] = texts[steps, players]
         outcomes = rows([frame.state.outcome[game] for frame in frames])
         return steps, columns | {
             "player": self._roles[players],

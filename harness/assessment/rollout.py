@@ -117,8 +117,6 @@ class _Rollout:
         self._arm, self._on_start, self._start_from = arm, on_start, start_from
         factors, shares = [factors_of(each) for each in arm.drivers], [shares_of(each) for each in arm.drivers]
         self._starts = arm.scene.start_distribution(factors, [1.0] * len(factors), shares)
-        self._steers = [driver is not None and driver.takes_over for driver in arm.drivers]
-        self._shields = arm.shields
         self._apart = _drivers_apart(arm)
         self._alone: Arena | None = None
 
@@ -163,7 +161,7 @@ class _Rollout:
 
     def _play(self, arena: Arena, starts: Mapping[int, InitialState]) -> dict[int, Game]:
         """Play games from their starts, as many at a time as the arena has tiles."""
-        traces, waiting = GameTraces(self._arm.scene, arena, self._steers, self._shields), deque(starts)
+        traces, waiting = GameTraces(self._arm, arena), deque(starts)
         free, episode_of, played = list(range(arena.games)), dict[int, int](), dict[int, Game]()
         while waiting or episode_of:
             begun = [free.pop() for _ in range(min(len(free), len(waiting)))]
@@ -179,7 +177,8 @@ class _Rollout:
             for tile in [each for each in episode_of if not runs[each].any()]:
                 episode = episode_of.pop(tile)
                 outcomes = [Outcome(outcome) for outcome in arena.state.outcome[tile].tolist()]
-                cells, trace = _played(self._arm, episode, outcomes, ""), traces.end(tile, episode)
+                cells = _played(self._arm, episode, outcomes, "") | self._weather(starts[episode])
+                trace = traces.end(tile, episode)
                 played[episode] = Game(played=cells, trace=trace, scene=self._arm.scene)
                 free.append(tile)
         return played
@@ -188,6 +187,13 @@ class _Rollout:
         present = [float(each) for each in self._arm.present_in(episode)]
         parts = parts_of(self._arm.seed, episode)
         return self._start_from(draw_initial_state(replace(self._starts, present_share=present), *parts))
+
+    def _weather(self, start: InitialState) -> dict[str, float]:
+        """What the scene varies of it, in one game."""
+        varies = self._arm.scene.document.varies
+        return {
+            name: getattr(start, name) for name in ("friction", "visibility_m") if getattr(varies, name) is not None
+        }
 
     def _departures(self, episode: int) -> list[Departure]:
         return self._arm.scene.departures(generator_of(*parts_of(self._arm.seed, episode), "others"))

@@ -8,7 +8,7 @@ import pyarrow as pa
 
 from harness.drivers.mixture import Mixture
 from harness.drivers.shield import ShieldedDriver
-from harness.evaluation.trace_file import SCHEMA, SHIELDED_SCHEMA
+from harness.evaluation.trace_file import schema_of
 from harness.game.roles import EGO
 from harness.road.scene.open_scene import OpenScene
 
@@ -30,7 +30,13 @@ class SeatedArm:
     @property
     def trace_schema(self) -> pa.Schema:
         """The columns of the traces of its games."""
-        return SHIELDED_SCHEMA if any(self.shields) else SCHEMA
+        return schema_of(shielded=any(self.shields), perceiving=self.perceives)
+
+    @property
+    def perceives(self) -> bool:
+        """Whether the ego drives with perception errors."""
+        ego = self.drivers[EGO]
+        return self.scene.perception_errors is not None and ego is not None and ego.takes_over
 
     @property
     def shields(self) -> list[ShieldedDriver | None]:

@@ -21,6 +21,7 @@ from harness.campaign.plan.stages import Stage
 from harness.campaign.plan.strategy_stages import crossplay_name
 from harness.campaign.trained_policies import check_policies, find_policies
 from harness.config.campaign import LEARNED, SUMO, Campaign, DocumentPath, Ego
+from harness.config.perception import EgoPerception
 from harness.config.persona import Persona
 from harness.config.toml_reading import Document, read_document
 from harness.config.traits import traits_of
@@ -44,6 +45,7 @@ class _NamedByEgo(Document):
     model_config = ConfigDict(extra="ignore")
     driver: DocumentPath = LEARNED
     persona: DocumentPath = Ego().persona
+    perception: DocumentPath | dict[str, Any] | None = None
 
 
 class _NamedByAttribution(Document):
@@ -139,6 +141,10 @@ def open_campaign(
     persona_files: list[Path] = []
     found = [collect(problems, partial(_read_persona, file, key, name, persona_files)) for key, name in written]
     ego_persona, *personas = found
+    if isinstance(written_perception := named.ego.perception, str):
+        perception = collect(problems, lambda: _read_perception(file, written_perception, persona_files))
+        if document is not None and perception is not None:
+            document = document.model_copy(update={"ego": document.ego.model_copy(update={"perception": perception})})
     baseline = personas.pop() if named.attribution is not None else None
     elsewhere: dict[str, str] = {}
     if ego_driver is not None and scene is not None:
@@ -225,6 +231,14 @@ def _read_persona(file: Path, key: str, written: str, files: list[Path]) -> Pers
     return persona
 
 
+def _read_perception(file: Path, written: str, files: list[Path]) -> EgoPerception:
+    """The perception errors that a campaign names; their file is added to `files`. Raises UsageError as above."""
+    path = _find_named(file, "ego.perception", written, "perception")
+    found = read_document(path, EgoPerception)
+    files.append(path)
+    return found
+
+
 def _relative(campaign_file: Path, path: Path) -> str:
     if path.resolve().is_relative_to(PACKAGE):
         return path.resolve().relative_to(PACKAGE.parent).as_posix()
@@ -261,6 +275,7 @@ def _ignored_tables(file: Path, document: Campaign, ego_driver: ExternalDriver |
     if document.ego.shield is not None and ego_driver is not None and ego_driver.vehicle_type is not None:
         message = f"SUMO drives the ego {document.ego.driver!r}, so that there is no decision to check"
         yield Problem(str(file), "ego.shield", message, "leave out this key, or name another ego.driver")
+    yield from _known_by_sumo(file, document, ego_driver)
     learned = document.ego.driver == LEARNED
     reasons = {}
     if not _is_tunable(ego_driver):
@@ -271,6 +286,12 @@ def _ignored_tables(file: Path, document: Campaign, ego_driver: ExternalDriver |
         if name in document.model_fields_set:
             message = f"this ego {reason}: the table would be ignored"
             yield Problem(str(file), name, message, "leave out this table, or name another ego")
+
+
+def _known_by_sumo(file: Path, document: Campaign, ego_driver: ExternalDriver | None) -> Iterator[Problem]:
+    if document.ego.perception is not None and ego_driver is not None and ego_driver.vehicle_type is not None:
+        message = f"SUMO drives the ego {document.ego.driver!r}, and its driver models know what is there"
+        yield Problem(str(file), "ego.perception", message, "leave out this key, or name another ego.driver")
 
 
 def _find_other_egos(
@@ -284,6 +305,10 @@ def _find_other_egos(
         driver = collect(problems, partial(find_driver, written, file, "crossplay.egos", allow_code))
         if driver is not None:
             found[crossplay_name(written)] = driver
+            if document.ego.perception is not None and driver.vehicle_type is not None:
+                message = f"SUMO drives {written!r}, and its driver models know what is there"
+                remedy = "leave out this driver, or ego.perception"
+                problems.append(Problem(str(file), "crossplay.egos", message, remedy))
             if scene is not None:
                 collect(problems, partial(driver.try_out, car_of(scene.world, EGO), False))
     return found

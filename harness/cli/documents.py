@@ -139,7 +139,9 @@ def _check_campaign(file: Path, allow_code: bool, as_json: bool, console: Consol
 def schema(
     document: Annotated[
         str | None,
-        typer.Argument(metavar="DOCUMENT", help="campaign, persona, scene or driver.  [default: all, with --out]"),
+        typer.Argument(
+            metavar="DOCUMENT", help="campaign, persona, scene, driver or perception.  [default: all, with --out]"
+        ),
     ] = None,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write DOCUMENT.schema.json into this folder.")

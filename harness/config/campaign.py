@@ -6,11 +6,13 @@ import os
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
+from harness.config.perception import EgoPerception
 from harness.config.scene import Name
-from harness.config.toml_reading import Document, Mistakes
+from harness.config.toml_reading import PATH, TABLE, Document, Mistakes
 from harness.config.training import NaiveTraining, NonEgoTraining, Reconfiguration, Retraining, Training
+from harness.game.perception_errors import PerceptionErrors
 from harness.game.roles import MOST_PEOPLE
 
 LEARNED, SUMO = "learned", "sumo"  # drivers of an ego that have a name
@@ -20,6 +22,10 @@ Seed = Annotated[int, Field(ge=0, lt=2**31)]
 CampaignName = Annotated[str, Field(min_length=1, max_length=40, pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 DocumentPath = Annotated[str, Field(min_length=1, max_length=500, pattern=r"^[^\x00-\x1f]*$")]
+PathOrTable = Annotated[
+    Annotated[DocumentPath, Tag(PATH)] | Annotated[EgoPerception, Tag(TABLE)],
+    Discriminator(lambda value: TABLE if isinstance(value, dict | EgoPerception) else PATH),
+]
 
 
 def ego_called(driver: str) -> str:
@@ -42,6 +48,18 @@ class Ego(Document):
     shield: Literal["rss"] | None = None
     """A safety layer. Each arm of an ego up to round 2 is played a second time with it: the ego's decision is kept
     unless responsibility-sensitive safety demands more braking. Nothing is trained with it. Left out: none."""
+    perception: PathOrTable | None = None
+    """Perception errors: a document, relative to this file, the name of a shipped one, or a table with the same keys.
+    The ego drives with them in every game, also where it or another player is trained. Each arm of an ego up to round 2
+    is played a second time without them. Left out: the ego sees what is there."""
+
+    @property
+    def perception_errors(self) -> PerceptionErrors | None:
+        """The errors as the game uses them, of a campaign whose documents are read."""
+        if self.perception is None:
+            return None
+        assert isinstance(self.perception, EgoPerception), "preflight reads the document"
+        return self.perception.errors
 
 
 class Population(Document):
@@ -238,6 +256,7 @@ class Campaign(Document):
         if self.ego.driver == SUMO and self.ego.shield is not None:
             message = "SUMO drives this ego, so that there is no decision to check"
             mistakes.append(("ego.shield", message, "leave out this key, or name another ego.driver"))
+        mistakes += self._perceived_by_sumo()
         if self.ego.driver != LEARNED:
             if self.rounds.count > Rounds().count:
                 message = "the ego does not learn, so there are no further rounds"
@@ -248,6 +267,18 @@ class Campaign(Document):
         if mistakes:
             raise Mistakes(mistakes)
         return self
+
+    def _perceived_by_sumo(self) -> list[tuple[str, str, str]]:
+        """Mistakes where perception errors are those of a driver of SUMO."""
+        if self.ego.perception is None:
+            return []
+        if self.ego.driver == SUMO:
+            message = "SUMO drives this ego, and its driver models know what is there"
+            return [("ego.perception", message, "leave out this key, or name another ego.driver")]
+        if self.crossplay is not None and SUMO in self.crossplay.egos:
+            message = "SUMO's driver knows what is there: it can't be compared with egos with perception errors"
+            return [("crossplay.egos", message, f"leave out {SUMO!r}, or ego.perception")]
+        return []
 
     def _unused_tables(self) -> list[str]:
         """The training tables of the document that nothing uses in a campaign with `policies`."""

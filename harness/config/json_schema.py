@@ -17,6 +17,7 @@ from pydantic.json_schema import GenerateJsonSchema
 
 from harness.config.campaign import Campaign
 from harness.config.driver import DriverDocument
+from harness.config.perception import EgoPerception
 from harness.config.persona import Persona
 from harness.config.scene import Scene
 from harness.config.toml_reading import nearest
@@ -24,7 +25,13 @@ from harness.errors import UsageError
 from harness.files import write_atomically
 from harness.game.payoff_terms import FUZZY_QUANTITIES, GROUPS, TERMS, Term
 
-DOCUMENTS: Mapping[str, Any] = {"campaign": Campaign, "persona": Persona, "scene": Scene, "driver": DriverDocument}
+DOCUMENTS: Mapping[str, Any] = {
+    "campaign": Campaign,
+    "persona": Persona,
+    "scene": Scene,
+    "driver": DriverDocument,
+    "perception": EgoPerception,
+}
 """All kinds of documents that users write, with their types."""
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from harness.config.campaign import DocumentPath, Seed
+from harness.config.perception import EgoPerception
 from harness.config.toml_reading import Document
 from harness.game.roles import MOST_PEOPLE
 
@@ -75,6 +76,8 @@ class PinnedGame(Document):
     """Failures of that arm that this game stands for."""
     ego_persona: DocumentPath
     """The persona of the ego's seat."""
+    ego_perception: EgoPerception | None = None
+    """The perception errors with which the ego drives; left out: it sees what is there."""
     people: list[PinnedPerson] = Field(min_length=1, max_length=MOST_PEOPLE)
     """The non-egos."""
     drawn_start: PinnedStart

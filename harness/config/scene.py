@@ -14,6 +14,7 @@ from harness.game.roles import MOST_PEOPLE, roles_of
 _Lower = Annotated[float, Field(ge=0.0, le=10.0)]
 _Share = Annotated[float, Field(ge=0.0, le=1.0)]
 _Upper = Annotated[float, Field(gt=0.0, le=10.0)]
+Visibility = Annotated[float, Field(gt=0.0, le=120.0)]
 Factors = Annotated[tuple[_Lower, _Upper], AfterValidator(ordered)]
 PlainFile = Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[A-Za-z0-9][A-Za-z0-9._ -]*$")]
 Point = tuple[float, float]
@@ -118,6 +119,8 @@ class Varies(Document):
     """Range of a factor on the background traffic: on the rates of flows, and on the number of single vehicles."""
     friction: Factors | None = None
     """Range of the coefficient of friction, instead of the scene's `friction`."""
+    visibility_m: Annotated[tuple[Visibility, Visibility], AfterValidator(ordered)] | None = None
+    """Range of the visibility, instead of the scene's `visibility_m`."""
     speed_limit_share: Factors | None = None
     """Range of a factor on all speed limits of the net."""
     signal_place: Annotated[tuple[_Share, _Share], AfterValidator(ordered)] | None = None
@@ -141,6 +144,9 @@ class Scene(Document):
     """Longest duration of a game. A player that has not reached its goal by then has failed."""
     friction: float = Field(0.8, gt=0.0, le=1.5)
     """Coefficient of friction between tyre and road, as a share of g."""
+    visibility_m: Visibility = 120.0
+    """Distance up to which players see road users and obstacles, from centre to centre, as in fog; an observation has
+    none beyond 120 m. SUMO's own drivers see as usual."""
     traffic_begin_s: float = Field(0.0, ge=0.0, le=1e7)
     """Time of the route file at which its traffic begins, as SUMO's option --begin."""
     warm_up_s: float = Field(0.0, ge=0.0, le=3600.0)

@@ -73,7 +73,7 @@ _MOST_BYTES, _MOST_MISTAKES = 1_000_000, 100
 _NAMES_SHOWN = 40
 _QUOTED = re.compile(r""""[^"\n]*"|'[^'\n]*'""")
 _ENDLESS_KEY = re.compile(r"(?<![\w.-])(?:[\w-]+[ \t]*\.[ \t]*){50}")
-NUMBER, TABLE = "<number>", "<table>"  # tags of a union's members; not part of any key
+NUMBER, PATH, TABLE = "<number>", "<path>", "<table>"  # tags of a union's members; not part of any key
 _NESTED_TOO_DEEP = ("tables are nested too deeply", "use a few levels of tables at most")
 
 D = TypeVar("D", bound=Document)
@@ -136,7 +136,7 @@ def one_of(words: Iterable[str], otherwise: str) -> AfterValidator:
 
 
 def _problems(path: Path, model: type[BaseModel], error: Any) -> Iterator[Problem]:
-    location = [part for part in error["loc"] if part not in ("function-after", "[key]", NUMBER, TABLE)]
+    location = [part for part in error["loc"] if part not in ("function-after", "[key]", NUMBER, PATH, TABLE)]
     named = model.named_location(location) if issubclass(model, Document) else location
     key = ".".join(f"[{part}]" if isinstance(part, int) else str(part) for part in named).replace(".[", "[")
     cause = error.get("ctx", {}).get("error")

@@ -15,6 +15,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from harness.environments.cartesian_views import CartesianViews, Sights
+from harness.environments.knowledge import Knowledge
 from harness.environments.nearby_bodies import NearbyBodies
 from harness.environments.seats import Seat, with_walkers
 from harness.environments.sumo_players import read_signals, read_sumo_players
@@ -22,8 +23,6 @@ from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.bicycle import Requested, move, requests
 from harness.game.human_factors import PlayersLimits, held_steering_rad, release_controls
 from harness.game.initial_state import InitialState
-from harness.game.memory import Memory, Perceived, as_they_are
-from harness.game.observation import observe
 from harness.game.observation_layout import SIZE
 from harness.game.outcome import Outcome
 from harness.game.quantities import Quantities
@@ -112,7 +111,6 @@ class Arena(LiveSimulation):
         self._lapsed_steering_rad = np.zeros((games, players, self.world.steps))
         self._held = np.zeros((games, players), dtype=bool)
         self._course_rad: FloatArray = np.zeros((games, players))  # of players that slide
-        self._memory = Memory(games, players, self.world.step_s)
         self._limits = PlayersLimits(games, players, self.world.steps)
         self._road_steering_rad: FloatArray = np.zeros((games, players))
         self._all_games = np.arange(games)
@@ -120,6 +118,7 @@ class Arena(LiveSimulation):
         self.signal_texts = [""] * games
         """States of the traffic lights as `Reading.signal_texts`; up to date if games are recorded."""
         self.nearby = NearbyBodies(self.world, scene.obstacles, games)
+        self.knowledge = Knowledge(scene, games, (self._limits, self.nearby), self._taken_over)
         self._views = CartesianViews(scene, [[seat.driver for seat in of_player] for of_player in self.seats])
 
     def reset(
@@ -139,10 +138,10 @@ class Arena(LiveSimulation):
         for _, seat, plays in self._seats_in(np.ones(self.state.present.shape, dtype=bool)):
             if seat.driver is not None:
                 seat.driver.reset(games[plays[games]])
-        self._memory.begin(self.state)
         self._views.reset(games)
+        self.knowledge.reset(starts, self.state)
         quantities = self.first_quantities(games)
-        observation = self.observation[games] = observe(quantities)
+        observation = self.observation[games] = self._observed(quantities, games, advance=True)
         self._road_steering_rad[games] = quantities.along.road_steering_rad
         check_observation(observation, games, self.state.step)
 
@@ -267,10 +266,9 @@ class Arena(LiveSimulation):
 
         `quantities` are those before players were removed, stopped or turned along a rail in the games `changed` [N].
         """
-        if self._limits.delays:
-            self._memory.remember(self.state)
+        self.knowledge.remember(self.state)
         self._road_steering_rad = quantities.along.road_steering_rad
-        self.observation = self._seen(quantities, self._all_games)
+        self.observation = self._observed(quantities, self._all_games, advance=True)
         if len(changed):
             # Positions are unchanged: only speeds are, and which players are present.
             state = self.state.of(changed)
@@ -278,20 +276,12 @@ class Arena(LiveSimulation):
             of_games = {name: getattr(quantities, name)[changed] for name in columns}
             bodies = self.nearby.of(state, self.reading, changed)
             after = Quantities(world=self.world, state=state, bodies=bodies, **of_games)
-            self.observation[changed] = self._seen(after, changed)
+            self.observation[changed] = self._observed(after, changed)
             self._road_steering_rad = self._road_steering_rad.copy()
             self._road_steering_rad[changed] = after.along.road_steering_rad
 
-    def _seen(self, quantities: Quantities, games: IntArray) -> FloatArray:
-        """[N, P, SIZE] the observations of games [N] with these quantities."""
-        return observe(quantities, self._perceived(quantities, games) if self._limits.delays else None)
-
-    def _perceived(self, quantities: Quantities, games: IntArray) -> Perceived:
-        """The bodies of games [N] as the players take them to be."""
-        if not self._limits.delays:
-            return as_they_are(quantities.bodies, len(self.seats))
-        lags = self._limits.lags(self.state.step)[games]
-        return self._memory.perceived(quantities.bodies, lags, games)
+    def _observed(self, quantities: Quantities, games: IntArray, *, advance: bool = False) -> FloatArray:
+        return self.knowledge.observations(quantities, self.state.step, self.reading, games, advance=advance)
 
     def _sights(self, games: IntArray) -> Sights:
         """What there is to see in games [N] now; the ways of the players do not matter for it."""
@@ -299,7 +289,7 @@ class Arena(LiveSimulation):
         quantities = self._quantities(state, state, np.zeros(state.x_m.shape), games)
         return Sights.of(
             quantities,
-            self._perceived(quantities, games),
+            self.knowledge.seen(quantities, self.state.step, self.reading, games),
             games=games,
             nearby=self.nearby,
             reading=self.reading,
@@ -314,7 +304,8 @@ class Arena(LiveSimulation):
         state.x_m[game], state.y_m[game], state.heading_rad[game] = start.x_m, start.y_m, start.heading_rad
         state.speed_mps[game], state.present[game] = start.speed_mps, start.present
         state.station_m[game] = start.station_m
-        state.friction[game], state.limit_share[game] = start.friction, start.limit_share
+        state.friction[game], state.visibility_m[game] = start.friction, start.visibility_m
+        state.limit_share[game] = start.limit_share
         state.acceleration_mps2[game] = state.steering_rad[game] = 0.0
         state.shoulder_glance[game], self._member[game] = start.shoulder_glance, start.member
         state.outcome[game], state.lapsed[game], state.step[game] = _RUNNING, False, 0

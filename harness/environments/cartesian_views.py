@@ -17,7 +17,7 @@ from harness.drivers.protocol import Driver, Planner, planner_of
 from harness.environments.nearby_bodies import NearbyBodies
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.cartesian_view import SIGNAL_STATES, CartesianView, SeenObject, SeenSignal
-from harness.game.field_of_view import seen_bodies
+from harness.game.field_of_view import Seen, seen_bodies
 from harness.game.memory import Perceived
 from harness.game.quantities import Quantities
 from harness.game.state import Bodies, State
@@ -28,6 +28,8 @@ from harness.sumo.simulation import Reading, Simulation
 _NO_SIGNALS = "off"
 _ON_FOOT = "pedestrian"
 _OBSTACLE = "obstacle"
+_GHOST = "passenger"
+"""The kind of an object that is not there, which perception errors of the ego make."""
 
 
 class _Named(NamedTuple):
@@ -148,12 +150,16 @@ class CartesianViews:
             kind = _ON_FOOT if scene.world.walks[body] else types[scene.vehicle(body).vehicle_type].vehicle_class
             name = scene.world.roles[body] if sights.driven_by_sumo[row, body] else None
             return _Named(("player", body), kind, name)
-        column = int(sights.columns[row, body])
-        if column < 0:
-            return _Named((_OBSTACLE, body - sights.bodies.present.shape[1]), _OBSTACLE, None)
+        names, obstacles = sights.names[row], len(scene.obstacles.each)
+        if body >= len(names):
+            return _Named(("ghost", body), _GHOST, None)
+        name = names[body]
+        if body >= len(names) - obstacles:
+            return _Named((_OBSTACLE, name), _OBSTACLE, None)
         assert sights.reading is not None
         game = int(sights.games[row])
-        name, kind = sights.reading.names[game, column], types[sights.reading.types[game, column]].vehicle_class
+        column = sights.reading.names[game].tolist().index(name)
+        kind = types[sights.reading.types[game, column]].vehicle_class
         return _Named(("vehicle", name), kind, None if kind == _ON_FOOT else name)
 
 
@@ -164,8 +170,8 @@ class Sights:
     games: IntArray
     state: State
     bodies: Bodies
-    columns: IntArray
-    """[N, B] of `reading`, as `NearbyBodies.columns`."""
+    names: Sequence[Sequence[str]]
+    """[N][B] of the bodies of the game, as `NearbyBodies.names`: those after them are ghosts."""
     reading: Reading | None
     perceived: Perceived
     seen: BoolArray
@@ -178,7 +184,7 @@ class Sights:
     def of(
         cls,
         quantities: Quantities,
-        perceived: Perceived,
+        known: Seen,
         *,
         games: IntArray,
         nearby: NearbyBodies,
@@ -186,17 +192,17 @@ class Sights:
         taken_over: BoolArray,
         simulation: Simulation,
     ) -> Sights:
-        """What the players see of these quantities of games [N], and take the bodies to be; `taken_over` [P] are the
-        players that the harness drives."""
+        """What the players see of these quantities of games [N], by what they take the bodies to be; `taken_over` [P]
+        are the players that the harness drives."""
         state = quantities.state
         return cls(
             games=games,
             state=state,
-            bodies=quantities.bodies,
-            columns=nearby.columns(state, reading, games),
+            bodies=known.bodies,
+            names=nearby.names(quantities.bodies, reading, games),
             reading=reading,
-            perceived=perceived,
-            seen=seen_bodies(quantities, perceived),
+            perceived=known.motion,
+            seen=seen_bodies(quantities, known),
             driven_by_sumo=state.running & ~taken_over,
             simulation=simulation,
         )

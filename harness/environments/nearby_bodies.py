@@ -17,7 +17,7 @@ class NearbyBodies:
 
     def __init__(self, world: World, obstacles: Obstacles, games: int) -> None:
         self._length_m, self._width_m = (np.tile(each, (games, 1)) for each in (world.length_m, world.width_m))
-        self._obstacles = obstacles
+        self._obstacles, self._roles = obstacles, list(world.roles)
         shape = (games, len(obstacles.each))
         self.poses: FloatArray = np.zeros((*shape, 3))
         """[G, O, 3] x_m, y_m and heading_rad of the obstacles."""
@@ -45,15 +45,20 @@ class NearbyBodies:
         columns = zip(bodies, standing, strict=True)
         return Bodies(*(np.concatenate(pair, axis=1) for pair in columns))
 
-    def columns(self, state: State, reading: Reading | None, games: IntArray) -> IntArray:
-        """[N, B] the columns of `reading` with the bodies of `of`; -1 for players and obstacles."""
-        bodies = self.of(state, reading, games)
-        columns = np.full(bodies.present.shape, -1)
-        if reading is not None and reading.present.size:
-            vehicles = Bodies(*(getattr(reading, name)[games] for name in Bodies._fields))
-            numbers = np.tile(np.arange(vehicles.present.shape[1], dtype=float), (len(games), 1))
-            players = state.present.shape[1]
-            among = Bodies(*(np.ascontiguousarray(each[:, :players]) for each in bodies))
-            numbered = among.with_nearest(vehicles._replace(length_m=numbers)).length_m[:, players:]
-            columns[:, players : players + numbered.shape[1]] = numbered
-        return columns
+    def names(self, bodies: Bodies, reading: Reading | None, games: IntArray) -> list[list[str]]:
+        """[N][B] the names of bodies that `of` found in games [N] with this reading; empty where none is present."""
+        last = [each.name for each in self._obstacles.each]
+        between = bodies.present.shape[1] - len(self._roles) - len(last)
+        if not between:
+            return [[*self._roles, *last]] * len(games)
+        assert reading is not None, "it has the bodies between players and obstacles"
+        found, first = list[list[str]](), len(self._roles)
+        for row, game in enumerate(games.tolist()):
+            there = np.flatnonzero(reading.present[game])
+            places_m = zip(reading.x_m[game, there].tolist(), reading.y_m[game, there].tolist(), strict=True)
+            by_place = dict(zip(places_m, reading.names[game, there].tolist(), strict=True))
+            own = slice(first, first + between)
+            columns = (bodies.x_m[row, own].tolist(), bodies.y_m[row, own].tolist(), bodies.present[row, own].tolist())
+            others = (by_place[x_m, y_m] if present else "" for x_m, y_m, present in zip(*columns, strict=True))
+            found.append([*self._roles, *others, *last])
+        return found

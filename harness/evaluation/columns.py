@@ -26,6 +26,7 @@ from harness.evaluation.falsification_columns import FALSIFICATION, SEARCHES
 from harness.evaluation.league_columns import LEAGUE_MEASURES, LEAGUE_PAIRING, LEAGUE_RANKS
 from harness.evaluation.measured_game import METRICS_OF_CONDUCT, METRICS_OF_GAMES, METRICS_OF_PLAYERS
 from harness.evaluation.over_trainings_columns import OVER_TRAININGS
+from harness.evaluation.perception_columns import PERCEPTION
 from harness.evaluation.preventability_columns import PREVENTABILITY, REFERENCE_DRIVERS, TAKEOVERS
 from harness.evaluation.selection_columns import SELECTIONS
 from harness.evaluation.severity.closeness import CRITERIA
@@ -34,6 +35,7 @@ from harness.evaluation.shield_columns import SHIELDS
 _T = "95 % t interval"
 _PAPER = "the paper, section 4.2"
 ARM = Column("arm", TEXT, "The name of the arm, such as naive_vs_speedy.")
+_ERROR_FREE_ARM = Column("error_free_arm", TEXT, "The same without the perception errors.")
 _SHIELDED_ARM = replace(ARM, name="shielded_arm", meaning="The same with the shield.")
 PERSONA = Column("persona", TEXT, "The persona of the non-ego; of an arm with one.")
 SEED = Column("seed", COUNT, "The training seed.")
@@ -41,6 +43,10 @@ EPISODE = Column("episode", COUNT, "The game. Equal numbers begin alike in every
 _GAME = (ARM, PERSONA, SEED, EPISODE)
 _EGO_FAILED = Column("ego_failed", MAYBE, "1 if the ego did not reach its goal, else 0.", source="the paper, section 4")
 _ERROR = Column("error", TEXT, "Why the game could not be played; empty if it was.")
+_WEATHER = (
+    Column("friction", NUMBER, "Coefficient of friction of the road, of a scene that varies it.", optional=True),
+    Column("visibility_m", NUMBER, "Distance up to which players see, of a scene that varies it.", optional=True),
+)
 _PLAYER = Column("player", TEXT, "`ego`, `non_ego`, `non_ego_2` and so on.")
 _EPISODES = Column("episodes", COUNT, "Games of the arm.", label="games")
 _PAIRS = (
@@ -123,9 +129,10 @@ _TABLES = {
         *(_outcome("non_ego", "person"), *_of_player("non_ego", "person")),
         Column("duration_s", NUMBER, "Duration of the game."),
         *(each.column for each in METRICS_OF_GAMES),
+        *_WEATHER,
         _ERROR,
     ),
-    "played": (*_GAME, _outcome("ego", "ego"), _outcome("non_ego", "person"), _ERROR),
+    "played": (*_GAME, _outcome("ego", "ego"), _outcome("non_ego", "person"), *_WEATHER, _ERROR),
     "causes": (
         *_GAME,
         _outcome("ego", "ego"),
@@ -229,6 +236,7 @@ _TABLES = {
     ),
     "selections": (PERSONA, SEED, *SELECTIONS),
     "shields": (ARM, _SHIELDED_ARM, PERSONA, SEED, *_PAIRS, *SHIELDS),
+    "perception": (ARM, _ERROR_FREE_ARM, PERSONA, SEED, *_PAIRS, *PERCEPTION),
     "populations": (
         ARM,
         Column("population", TEXT, "The population that drove against the ego."),

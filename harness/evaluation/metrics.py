@@ -56,6 +56,12 @@ class Drive:
         flags = self.game.shielded
         return None if flags is None else self.game.while_driving(flags, self.player)
 
+    def perceived_share(self, column: str) -> float | None:
+        """Share of its steps in which a column of `trace_columns.PERCEIVED` says something."""
+        flags = self.game.perceived(column)
+        said = None if flags is None else self.game.while_driving(flags, self.player)
+        return float(said.mean()) if said is not None and len(said) else None
+
     @property
     def encounters(self) -> tuple[Encounter, ...]:
         """Its encounters at junctions."""
@@ -237,3 +243,27 @@ def shield_interventions_per_km(drive: Drive) -> float | None:
 )
 def shielded_share(drive: Drive) -> float | None:
     return float(drive.shielded.mean()) if drive.shielded is not None and len(drive.shielded) else None
+
+
+@metric(
+    "ego",
+    meaning="Share of the steps in which its perception has lost a road user or obstacle in range; empty in arms "
+    "without perception errors, and no column in runs without them.",
+    mean="lost_share",
+    unit=SHARE,
+    optional=True,
+)
+def lost_share(drive: Drive) -> float | None:
+    return drive.perceived_share("ego_lost")
+
+
+@metric(
+    "ego",
+    meaning="Share of the steps in which it sees a ghost; empty in arms without perception errors, and no column in "
+    "runs without them.",
+    mean="ghost_share",
+    unit=SHARE,
+    optional=True,
+)
+def ghost_share(drive: Drive) -> float | None:
+    return drive.perceived_share("ego_ghosts")

@@ -16,6 +16,7 @@ from scipy.stats.contingency import odds_ratio
 from harness.evaluation.strategies import (
     ATTENTIVE,
     Arm,
+    ErrorFreeEgo,
     NaiveEgo,
     PersonaNonEgo,
     RetrainedEgo,
@@ -177,7 +178,9 @@ def _players(conduct: pd.DataFrame, arms: Mapping[str, Arm]) -> dict[_Player, pd
 def _roles(arms: Iterable[Arm]) -> Iterator[tuple[Arm, str, str]]:
     """Each arm with a player of it: its name in the table, and its persona."""
     own = [arm for arm in arms if arm.best_response_of is None and not arm.is_of_a_trait]
-    own = [arm for arm in own if not isinstance(arm.ego, ShieldedEgo)]  # the same people in the same games
+    own = [
+        arm for arm in own if not isinstance(arm.ego, ShieldedEgo | ErrorFreeEgo)
+    ]  # the same people in the same games
     for arm in own:
         if isinstance(arm.ego, NaiveEgo | RetrainedEgo):
             yield arm, f"{strategy_name(arm.ego)} ego", ""

@@ -20,6 +20,7 @@ from harness.game.geometry import Box, box_distance
 from harness.game.junctions import SIGNALS, Signal
 from harness.game.outcome import Outcome
 from harness.game.quantities import Quantities
+from harness.game.roles import EGO
 from harness.game.state import NEAREST, NOTICED_M, Bodies, PlayersMotion, State
 from harness.game.traffic_rules import since_change_s
 from harness.game.world import World
@@ -39,7 +40,7 @@ class RecordedGame:
     """A game from its trace, the constants of its scene, and the vehicle types (SUMO's default without an entry)."""
 
     trace: pd.DataFrame
-    """Columns of `trace_file.SCHEMA` or `SHIELDED_SCHEMA`."""
+    """Columns of a schema of `trace_file.schema_of`."""
     world: World
     kinds: Mapping[str, BodyKind]
 
@@ -116,6 +117,19 @@ class RecordedGame:
         if "shielded" not in self.trace.columns:
             return None
         return self._filled("shielded")[:, : len(self.world.roles)]
+
+    def perceived(self, column: str) -> BoolArray | None:
+        """[T, P] where a column of `trace_columns.PERCEIVED` says something; None: the arm has no perception errors."""
+        if column not in self.trace.columns:
+            return None
+        return self._filled("", self.trace[column].to_numpy() != "")[:, : len(self.world.roles)]
+
+    def lost_by_ego(self, body: int) -> BoolArray:
+        """[T] whether the ego's perception has lost a body."""
+        if "ego_lost" not in self.trace.columns:
+            return np.zeros(len(self._present), dtype=bool)
+        lost = self._filled("ego_lost")[:, EGO]
+        return np.array([self.names[body] in str(names).split() for names in lost], dtype=bool)
 
     @cached_property
     def payoff(self) -> FloatArray:

@@ -35,11 +35,21 @@ class RobustEgo:
     """The ego retrained against several personas at once."""
 
 
+OwnEgo = NaiveEgo | RetrainedEgo | ReconfiguredEgo | RobustEgo
+
+
 @dataclass(frozen=True, kw_only=True)
 class ShieldedEgo:
     """An ego with the campaign's shield: its decisions are kept unless a rule forbids them."""
 
-    of: NaiveEgo | RetrainedEgo | ReconfiguredEgo | RobustEgo
+    of: OwnEgo
+
+
+@dataclass(frozen=True, kw_only=True)
+class ErrorFreeEgo:
+    """An ego without the campaign's perception errors."""
+
+    of: OwnEgo
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,7 +102,7 @@ class BestResponse:
     start: int
 
 
-EgoStrategy = NaiveEgo | RetrainedEgo | ReconfiguredEgo | RobustEgo | ShieldedEgo | OtherEgo | RoundAnswer
+EgoStrategy = OwnEgo | ShieldedEgo | ErrorFreeEgo | OtherEgo | RoundAnswer
 NonEgoStrategy = SumoNonEgo | PersonaNonEgo | RoundAnswer
 Strategy = EgoStrategy | NonEgoStrategy | BestResponse
 
@@ -143,8 +153,8 @@ def against_persona(ego: EgoStrategy, persona: str) -> Arm:
 
 def counterparts(arm: Arm) -> list[Arm]:
     """The arms to compare an arm with: the ego of round 2 with the naive ego, against the persona of its training; a
-    shielded ego with the same one without its shield."""
-    if isinstance(arm.ego, ShieldedEgo):
+    shielded ego with the same one without its shield, one without perception errors with the same one with them."""
+    if isinstance(arm.ego, ShieldedEgo | ErrorFreeEgo):
         return [replace(arm, ego=arm.ego.of)]
     if not isinstance(arm.non_ego, PersonaNonEgo):
         return []
@@ -169,6 +179,8 @@ def strategy_name(strategy: Strategy) -> str:
             return "robust"
         case ShieldedEgo(of=of):
             return f"shielded_{strategy_name(of)}"
+        case ErrorFreeEgo(of=of):
+            return f"error_free_{strategy_name(of)}"
         case OtherEgo(driver=driver):
             return driver
         case SumoNonEgo():
@@ -208,7 +220,7 @@ def round_of(strategy: Strategy) -> int:
             return round_
         case ReconfiguredEgo():
             return PAPER_ROUNDS
-        case RoundAnswer(of=of) | ShieldedEgo(of=of):
+        case RoundAnswer(of=of) | ShieldedEgo(of=of) | ErrorFreeEgo(of=of):
             return round_of(of)
         case _:
             return 0
@@ -217,6 +229,8 @@ def round_of(strategy: Strategy) -> int:
 def _pair_name(ego: EgoStrategy | None, non_ego: NonEgoStrategy | None) -> str:
     if isinstance(ego, ShieldedEgo):
         return f"shielded_{_pair_name(ego.of, non_ego)}"
+    if isinstance(ego, ErrorFreeEgo):
+        return f"error_free_{_pair_name(ego.of, non_ego)}"
     if ego is None:
         assert non_ego is not None, "an arm has at least one player"
         return f"{strategy_name(non_ego)}_alone"

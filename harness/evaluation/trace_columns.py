@@ -5,6 +5,20 @@ from __future__ import annotations
 from harness.evaluation.column import COUNT, FLAG, NUMBER, TEXT, Column
 
 SHIELDED = Column("shielded", FLAG, "Whether a shield changed the player's decision; in arms with a shield only.")
+PERCEIVED = (
+    Column(
+        "ego_lost",
+        TEXT,
+        "In the ego's rows: the road users that its object list lacks because they are lost, separated by spaces; in "
+        "arms with perception errors only.",
+    ),
+    Column(
+        "ego_ghosts",
+        TEXT,
+        "In the ego's rows: the ghosts that it sees, separated by `; `, each with x_m, y_m, heading_rad and speed_mps; "
+        "in arms with perception errors only.",
+    ),
+)
 _LINKS = "by traffic light and signal link"
 TRACE_COLUMNS = (
     Column("episode", COUNT, "The game."),

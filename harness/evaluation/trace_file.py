@@ -24,7 +24,7 @@ import pyarrow.parquet as pq
 
 from harness.errors import UsageError
 from harness.evaluation.column import COUNT, FLAG, NUMBER, TEXT
-from harness.evaluation.trace_columns import SHIELDED, TRACE_COLUMNS
+from harness.evaluation.trace_columns import PERCEIVED, SHIELDED, TRACE_COLUMNS
 from harness.files import check_file, errors_naming, replace_durably, scratch_beside
 from harness.game.arrays import FloatArray
 
@@ -36,17 +36,23 @@ _LARGEST, _MOST_STEPS = 1e8, 1_000_000
 _TEXT = pa.dictionary(pa.int32(), pa.string())
 _TYPES = {COUNT: pa.int32(), NUMBER: pa.float64(), FLAG: pa.bool_(), TEXT: _TEXT}
 SCHEMA = pa.schema([(column.name, _TYPES[column.dtype]) for column in TRACE_COLUMNS])
-SHIELDED_SCHEMA = SCHEMA.append(pa.field(SHIELDED.name, _TYPES[SHIELDED.dtype]))
-"""Of the traces of an arm with a shield."""
 
-_TEXTS = [field.name for field in SCHEMA if field.type == _TEXT]
+
+def schema_of(*, shielded: bool, perceiving: bool) -> pa.Schema:
+    """The columns of the traces of an arm: with a shield, with perception errors."""
+    more = [*([SHIELDED] if shielded else []), *(PERCEIVED if perceiving else ())]
+    return pa.schema([*SCHEMA, *((column.name, _TYPES[column.dtype]) for column in more)])
+
+
+_SCHEMAS = [schema_of(shielded=shield, perceiving=errors) for shield in (False, True) for errors in (False, True)]
+_TEXTS = [field.name for field in _SCHEMAS[-1] if field.type == _TEXT]
 _NUMBERS = [field.name for field in SCHEMA if field.type == pa.float64()]
 
 
 @contextmanager
 def trace_writer(path: Path, schema: pa.Schema = SCHEMA) -> Iterator[Callable[[Mapping[str, Sequence[Any]]], None]]:
     """Writes the games of a segment: a function that adds one, as columns of its trace. The file appears only when all
-    games are in it. `schema`: `SCHEMA` or `SHIELDED_SCHEMA`."""
+    games are in it. `schema`: as `schema_of`."""
     games: list[pa.Table] = [schema.empty_table()]
 
     def add(columns: Mapping[str, Sequence[Any]]) -> None:
@@ -66,7 +72,8 @@ def join_traces(parts: Sequence[Path], path: Path, labels: Mapping[str, str | in
     metadata: dict[bytes | str, bytes | str] = {name: str(label) for name, label in labels.items()}
     if labels:
         metadata["PANDAS_ATTRS"] = json.dumps(dict(labels))
-    schema = SHIELDED_SCHEMA if SHIELDED.name in pq.read_schema(parts[0]).names else SCHEMA
+    names = pq.read_schema(parts[0]).names
+    schema = schema_of(shielded=SHIELDED.name in names, perceiving=PERCEIVED[0].name in names)
     _write((group for part in parts for group in _row_groups(part)), path, schema.with_metadata(metadata or None))
 
 
@@ -157,7 +164,7 @@ def _row_groups(path: Path) -> Iterator[pa.Table]:
 
 
 def _with_strings(frame: pd.DataFrame) -> pd.DataFrame:
-    for name in _TEXTS:
+    for name in frame.columns.intersection(_TEXTS):
         frame[name] = frame[name].astype(str)
     return frame
 
@@ -179,7 +186,7 @@ def check_traces(path: Path, episodes: Iterable[int]) -> None:
 
 
 def _check_schema(schema: pa.Schema) -> None:
-    if not schema.equals(SCHEMA) and not schema.equals(SHIELDED_SCHEMA):
+    if not any(map(schema.equals, _SCHEMAS)):
         different = sorted(set(schema.names) ^ set(SCHEMA.names)) or ["types"]
         raise ValueError(f"its columns are not those of a trace: {', '.join(different)[:200]}")
 

@@ -73,6 +73,7 @@ class InitialState:
     limits: tuple[Limits, ...]
     member: tuple[int, ...]  # index of the driver that each player has in this game
     friction: float
+    visibility_m: float
     limit_share: float
     signal_place: float  # in the cycles of traffic lights at which the game starts, from 0 to 1
     follower: Follower | None  # who follows the ego; None: nobody does
@@ -111,6 +112,7 @@ class StartDistribution:
     step_s: float
     routes: Routes
     friction: tuple[float, float]
+    visibility_m: tuple[float, float] = (np.inf, np.inf)
     limit_share: tuple[float, float] = (1.0, 1.0)
     signal_place: tuple[float, float] = (0.0, 1.0)
     along_route_share: float = 0.0
@@ -179,6 +181,7 @@ def draw_initial_state(starts: StartDistribution, *parts: str | int) -> InitialS
         limits=tuple(limits),
         member=tuple(member),
         friction=_varied(starts.friction, "friction", *parts),
+        visibility_m=_varied(starts.visibility_m, "visibility", *parts),
         limit_share=_varied(starts.limit_share, "speed limit", *parts),
         signal_place=between(starts.signal_place, generator_of(*parts, "signals").random()),
         follower=draw_follower(starts.followed_share, *parts) if present[EGO] else None,

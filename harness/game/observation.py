@@ -19,11 +19,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
-from harness.game.field_of_view import SEEN_M, Eyes, in_view
+from harness.game.field_of_view import SEEN_M, Eyes, Seen, as_it_is, in_view
 from harness.game.jit import compiled, inlined
 from harness.game.junctions import Control, Signal, StopLines
 from harness.game.meetings import Meetings
-from harness.game.memory import Perceived, as_they_are
+from harness.game.memory import Perceived
 from harness.game.observation_layout import BEHIND, COMPRESSED, ENTRIES, FIRST_OTHER, OTHER, OTHERS, OWN, SCALE, SIZE
 from harness.game.quantities import Quantities
 from harness.game.road import AHEAD_M, Routes
@@ -55,6 +55,7 @@ class _Players(NamedTuple):
     closing_error_per_s: FloatArray
     signals: IntArray
     signal_s: FloatArray
+    visibility_m: FloatArray
 
 
 class _Views(NamedTuple):
@@ -76,20 +77,19 @@ class _Views(NamedTuple):
 _columns = attrgetter(*_Players._fields)  # plain tuples: numba takes them apart three times as fast as records
 
 
-def observe(q: Quantities, perceived: Perceived | None = None) -> FloatArray:
-    """[G, P, SIZE] float32 in [-1, 1]: the players' observations; zeros for players that are not present. `perceived`:
-    the bodies as the players take them to be; left out: as they are."""
+def observe(q: Quantities, seen: Seen | None = None) -> FloatArray:
+    """[G, P, SIZE] float32 in [-1, 1]: the players' observations; zeros for players that are not present. `seen`: the
+    bodies as the players take them to be; left out: as they are."""
     world, rules, along = q.world, q.rules, q.along
+    seen = seen or as_it_is(q)
     views = (  # the columns of `_Views`
         *(q.lateral_offset_m, rules.next_line, rules.posted_mps),
-        *(along.speed_limit_mps, along.road_steering_rad, along.lane_end_m, along.goal_m, q.hidden),
+        *(along.speed_limit_mps, along.road_steering_rad, along.lane_end_m, along.goal_m, seen.hidden),
         *(world.actuators.max_steering_rad, world.length_m, world.width_m),
     )
-    records = (q.bodies, world.road.routes, world.right_of_way.stop_lines, q.meetings)
-    if perceived is None:
-        perceived = as_they_are(q.bodies, q.state.present.shape[1])
+    records = (seen.bodies, world.road.routes, world.right_of_way.stop_lines, seen.meetings)
     moving = q.bodies.present.shape[1] - len(world.hiding.obstacles)
-    return _observe((_columns(q.state), views, *map(tuple, records)), perceived, moving)
+    return _observe((_columns(q.state), views, *map(tuple, records)), seen.motion, moving)
 
 
 @compiled
@@ -106,8 +106,10 @@ def _observe(tables: tuple[tuple[Any, ...], ...], perceived: Perceived, moving: 
         if players.present[g, p]:
             place = on_route(players.station_m[g, p], views.offset_m[g, p], p, routes)
             heading_rad, own_mps = players.heading_rad[g, p], players.speed_mps[g, p]
-            sight = (min(players.sight_m[g, p], SEEN_M), players.sight_cosine[g, p], players.shoulder_glance[g, p])
-            eyes: Eyes = (np.cos(heading_rad), np.sin(heading_rad), *sight, views.length_m[p], views.width_m[p])
+            reach_m = min(players.visibility_m[g], SEEN_M)
+            sight = (min(players.sight_m[g, p], reach_m), reach_m, players.sight_cosine[g, p])
+            size_m = (views.length_m[p], views.width_m[p])
+            eyes: Eyes = (np.cos(heading_rad), np.sin(heading_rad), *sight, players.shoulder_glance[g, p], *size_m)
             error = players.distance_error[g, p]
             view[:] = 0.0
             _see_own_motion(view, players, views, (g, p))

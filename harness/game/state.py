@@ -64,6 +64,7 @@ class State:
     closing_error_per_s: FloatArray  # error of closing speeds, per distance: + is moving away
     step: IntArray  # [G]
     friction: FloatArray  # [G] coefficient of friction of the road
+    visibility_m: FloatArray  # [G] distance up to which bodies are seen
     limit_share: FloatArray  # [G] factor on the speed limits
     signals: IntArray  # [G, L] int8, states of signal links (`right_of_way.Signal`)
     signal_s: FloatArray  # [G, L] seconds since they changed
@@ -81,6 +82,7 @@ class State:
             "sight_cosine": np.full(shape, ALL_AROUND),
             "step": np.zeros(games, dtype=np.int64),
             "friction": np.ones(games),
+            "visibility_m": np.full(games, np.inf),
             "limit_share": np.ones(games),
             "signals": np.zeros((games, signals), dtype=np.int8),
             "signal_s": np.zeros((games, signals)),

@@ -10,6 +10,7 @@ from harness.evaluation.strategies import (
     Arm,
     Borrowed,
     EgoStrategy,
+    ErrorFreeEgo,
     NaiveEgo,
     NonEgoStrategy,
     PersonaNonEgo,
@@ -37,6 +38,8 @@ def _in_words(arm: Arm, tables: RunTables) -> str:
     match arm:
         case Arm(ego=ShieldedEgo(of=of)):
             return f"{_in_words(replace(arm, ego=of), tables)}; the ego has a shield"
+        case Arm(ego=ErrorFreeEgo(of=of)):
+            return f"{_in_words(replace(arm, ego=of), tables)}; the ego has no perception errors"
         case Arm(ego=None, non_ego=non_ego) if non_ego is not None:
             return f"{_non_ego_in_words(non_ego)} without the ego"
         case Arm(ego=NaiveEgo(), non_ego=None):

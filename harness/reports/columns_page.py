@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from harness.evaluation.columns import TABLES
-from harness.evaluation.trace_columns import SHIELDED, TRACE_COLUMNS
+from harness.evaluation.trace_columns import PERCEIVED, SHIELDED, TRACE_COLUMNS
 from harness.reports.page_template import environment_of
 
 _ORDER = ("episodes", "causes", "manoeuvres", "summary", "comparisons")
@@ -13,4 +13,7 @@ def columns_page() -> str:
     """The page `docs/columns.md`."""
     names = [*_ORDER, *(name for name in TABLES if name not in (*_ORDER, "played"))]
     template = environment_of("reports", autoescape=False).get_template("columns.md.jinja")
-    return template.render(tables={name: TABLES[name] for name in names}, traces=(*TRACE_COLUMNS, SHIELDED)) + "\n"
+    return (
+        template.render(tables={name: TABLES[name] for name in names}, traces=(*TRACE_COLUMNS, SHIELDED, *PERCEIVED))
+        + "\n"
+    )

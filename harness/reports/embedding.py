@@ -95,6 +95,9 @@ class GameTracks:
     """Time (s) and place (x, y in m) of each contact."""
     reference: Reference | None = None
     """How a reference driver takes over and prevents the collision; None: none does."""
+    perceived: Sequence[tuple[int, Sequence[str], int]] = ()
+    """From which step on the ego's perception has lost which road users and sees how many ghosts; empty without
+    errors."""
 
 
 Marks = Mapping[str, Sequence[Mapping[str, Any]]]
@@ -146,6 +149,7 @@ def game_text(game: GameTracks, marks: Marks, causes: Causes, crowds: Crowds) ->
     for player in game.players:
         persona = {"persona": people[player.name]} if player.name in people else {}
         players.append(_track(player) | {"outcome": player.outcome, "ended": player.ended_step} | persona)
+    perceived = {"perceived": [list(each) for each in game.perceived]} if game.perceived else {}
     return json_text(
         {
             "arm": game.arm,
@@ -163,6 +167,7 @@ def game_text(game: GameTracks, marks: Marks, causes: Causes, crowds: Crowds) ->
             "touches": [[round(time_s, 3), round(x_m, 2), round(y_m, 2)] for time_s, x_m, y_m in game.touches],
             "marks": list(marks.get(key(game.arm, game.seed, game.episode), ())),
             "packed": pack(columns_of(game)),
+            **perceived,
         }
     )
 

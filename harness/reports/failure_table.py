@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +12,9 @@ from harness.evaluation.comparisons.comparison import rate_cells
 from harness.evaluation.strategies import (
     Arm,
     EgoStrategy,
+    ErrorFreeEgo,
     NaiveEgo,
+    OwnEgo,
     PersonaNonEgo,
     ReconfiguredEgo,
     RetrainedEgo,
@@ -87,15 +89,24 @@ def egos_in(tables: RunTables) -> dict[str, list[EgoStrategy]]:
         egos[f"{tables.change.made} ego"] = list(dict.fromkeys(changed))
     if any(arm.ego == RobustEgo() for arm in tables.arms.values()):
         egos["robust ego"] = [RobustEgo()]
-    with_shield = {arm.ego for arm in tables.arms.values() if isinstance(arm.ego, ShieldedEgo)}
+    known = {arm.ego for arm in tables.arms.values()}
     for words, column in list(egos.items()):
-        shielded: list[EgoStrategy] = [each for each in map(_shielded, column) if each in with_shield]
-        egos |= {f"{words} with the shield": shielded} if shielded else {}
+        for differs, twin_of in _TWINS.items():
+            twins: list[EgoStrategy] = [twin_of(of=each) for each in column if isinstance(each, OwnEgo)]
+            twins = [each for each in twins if each in known]
+            egos |= {f"{words} {differs}": twins} if twins else {}
     return egos
 
 
-def _shielded(ego: EgoStrategy) -> EgoStrategy:
-    return ShieldedEgo(of=ego) if isinstance(ego, NaiveEgo | RetrainedEgo | ReconfiguredEgo | RobustEgo) else ego
+_TWINS: Mapping[str, Callable[..., ShieldedEgo | ErrorFreeEgo]] = {
+    "with the shield": ShieldedEgo,
+    "without perception errors": ErrorFreeEgo,
+}
+"""Egos that play the same games as another one, by what differs."""
+
+
+def _with_twins(ego: EgoStrategy) -> list[EgoStrategy]:
+    return [ego, *(twin_of(of=ego) for twin_of in _TWINS.values())] if isinstance(ego, OwnEgo) else [ego]
 
 
 def _lines(tables: RunTables, links: GameLinks) -> Iterator[PersonLine]:
@@ -111,7 +122,7 @@ def _lines(tables: RunTables, links: GameLinks) -> Iterator[PersonLine]:
     if (baseline := tables.manifest.get("baseline")) and baseline not in tables.personas:
         yield PersonLine(person=baseline, cells=cells(PersonaNonEgo(persona=baseline)) + last, is_baseline=True)
     for persona in tables.personas:
-        answers = tables.last_ego(persona), _shielded(tables.last_ego(persona))
+        answers = _with_twins(tables.last_ego(persona))
         own = [[each for each in column if len(column) == 1 or each in answers] for column in egos]
         met = [_cell([against_persona(ego, persona).name for ego in column], tables, links) for column in own]
         yield PersonLine(person=persona, cells=[*met, judged[persona]] if last else met)

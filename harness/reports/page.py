@@ -41,6 +41,7 @@ CAPTIONS = {
     "episodes": "A row per game.",
     "reconfiguration": "A row per trial and parameter of a search.",
     "shields": "A row per arm and training seed: the ego without its shield, and with it, in the same games.",
+    "perception": "A row per arm and training seed: the ego with perception errors, and without, in the same games.",
     "selections": "A row per candidate of each selection; the last one is the new answer.",
 }
 """Of the tables that are shown as the CSV files have them."""

@@ -24,6 +24,7 @@ def facts(manifest: Mapping[str, Any], seeds: Sequence[int], personas: int) -> l
     found = [
         ("Scene", scene_of(manifest)),
         ("Ego", ego_of(manifest)),
+        ("Perception of the ego", perception_of(campaign)),
         ("Rounds", "" if ego in ("", "learned") else rounds(manifest.get("stages", {}).values())),
         ("Personas", str(personas)),
         ("Training seeds", ", ".join(map(str, manifest.get("seeds", seeds)))),
@@ -44,6 +45,12 @@ def ego_of(manifest: Mapping[str, Any]) -> str:
     """What drives the ego of a run."""
     ego = str(manifest.get("campaign", {}).get("ego", {}).get("driver", ""))
     return str((manifest.get("ego_driver") or {}).get("in_words") or ego)
+
+
+def perception_of(campaign: Mapping[str, Any]) -> str:
+    """The perception errors of the ego; empty if it has none."""
+    document = campaign.get("ego", {}).get("perception") or {}
+    return f"{document['name']}, with errors" if "name" in document else ""
 
 
 def finished_on(manifest: Mapping[str, Any]) -> str:

@@ -79,6 +79,8 @@ class RunTables:
     """Empty: the campaign has no rounds after the paper's."""
     shields: pd.DataFrame = field(default_factory=_empty("shields"))
     """Empty: the ego has no shield."""
+    perception: pd.DataFrame = field(default_factory=_empty("perception"))
+    """Empty: the ego has no perception errors."""
     populations: pd.DataFrame = field(default_factory=_empty("populations"))
     causes: pd.DataFrame = field(default_factory=_empty("causes"))
     starts: pd.DataFrame = field(default_factory=pd.DataFrame)

@@ -9,6 +9,18 @@ function make(tag, { text, ...attributes } = {}, ...children) {
   return element;
 }
 
+/** What the ego's perception has lost at a time, and how many ghosts it sees, in words. */
+function perceivedIn(game, time) {
+  const step = Math.floor(time / game.step + 1e-6);
+  const [, lost, ghosts] = (game.perceived ?? []).findLast(each => each[0] <= step) ?? [0, [], 0];
+  const names = lost.map(name => {
+    const track = game.players.find(each => each.name === name);
+    return track ? nameOf(game, track) : name;
+  });
+  return (names.length ? `, has lost ${names.join(", ")}` : "")
+    + (ghosts ? `, sees ${ghosts === 1 ? "a ghost" : `${ghosts} ghosts`}` : "");
+}
+
 class GameScreen {
   /** `seek` is called with the time of a click on the curves or on a manoeuvre. */
   constructor(game, seek) {
@@ -119,7 +131,7 @@ class GameScreen {
       if (stepAt(this.game, track, time) === null) return [track.name, `${nameOf(this.game, track)}: has left`];
       const speed = `${valueAt(this.game, track, "speed", time).toFixed(1)} m/s`;
       const [gap, soon] = ["gap", "time"].map(name => valueAt(this.game, track, name, time));
-      return [track.name, `${nameOf(this.game, track)} ${speed}`
+      return [track.name, `${nameOf(this.game, track)} ${speed}${track.name === "ego" ? perceivedIn(this.game, time) : ""}`
         + (Number.isNaN(gap) ? "" : `, gap ${gap.toFixed(1)} m`) + (Number.isNaN(soon) ? "" : `, TTC ${soon.toFixed(1)} s`)];
     });
     const text = values.map(each => each[1]).join("; ");

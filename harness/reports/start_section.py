@@ -36,6 +36,7 @@ _OTHERS = {
     "ego_position_m": "ego along its way (m)",
     "ego_speed_mps": "speed of the ego (m/s)",
     "friction": "friction",
+    "visibility_m": "visibility (m)",
     "speed_limit_share": "factor on the speed limits",
     "signal_place": "place in the cycles of the signals",
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from errno import ENOSPC
 from typing import Any
 
@@ -11,6 +12,9 @@ import pytest
 
 from harness.assessment.rollout import assess_batches, plays_side_by_side
 from harness.assessment.seated_arm import SeatedArm
+from harness.config.perception import EgoPerception
+from harness.config.scene import Varies
+from harness.config.toml_reading import read_document
 from harness.drivers.car import car_of
 from harness.drivers.policy_file import LearnedDriver
 from harness.drivers.reference_drivers import UPPER_BOUND, reference_driver
@@ -24,9 +28,11 @@ from harness.evaluation.trace_file import SCHEMA
 from harness.game.arrays import FloatArray, IntArray
 from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.policies import some_policy
+from tests.support.repository import REPOSITORY
 from tests.support.rollouts import Steady, arm, play, records, trace
 from tests.support.tiny import TEXTING
 
+FOGGY = REPOSITORY / "tests" / "data" / "perception" / "foggy.toml"
 RANDOM = LearnedDriver(some_policy(), sampled=True)
 MEASURED = [name for name, column in TABLES["episodes"].items() if column.dtype == NUMBER]
 POSE = ["x_m", "y_m", "heading_rad", "speed_mps"]
@@ -54,6 +60,15 @@ def test_assess__twice_is_the_same_whatever_the_number_of_games(merge: OpenScene
     assert records(first[:2]) == records(second)
     for one, other in zip(first, second, strict=False):
         pd.testing.assert_frame_equal(trace(one), trace(other), check_exact=True)
+
+
+def test_assess__what_a_scene_varies_of_the_weather_is_in_the_row_of_the_game(merge: OpenScene) -> None:
+    varies = Varies(friction=(0.3, 0.7), visibility_m=(40.0, 80.0))
+    varying = replace(merge, document=merge.document.model_copy(update={"varies": varies}))
+    found = [(game.record["friction"], game.record["visibility_m"]) for game in play(arm(varying, Steady(), None))]
+    assert len(set(found)) == 3
+    assert all(0.3 <= friction <= 0.7 and 40.0 <= visibility_m <= 80.0 for friction, visibility_m in found)
+    assert "visibility_m" not in play(arm(merge, Steady(), None))[0].record
 
 
 def test_assess__episodes_and_seeds_give_different_games(merge: OpenScene) -> None:
@@ -102,6 +117,23 @@ def test_batch__has_the_bytes_of_games_alone(scene: str, judged: bool) -> None:
     assessed = arm(opened, ego, RANDOM, persona=TEXTING)
     alone = side_by_side(assessed, *([episode] for episode in range(5)))
     assert side_by_side(assessed, [0, 1, 2], [4, 3]) == [*alone[:3], alone[4], alone[3]]
+
+
+def test_batch__has_the_bytes_of_games_alone_with_perception_errors() -> None:
+    """The policy sees ghosts and loses the person: the games are other ones than without errors, with their starts."""
+    plain = arm(open_scene("paper_merge"), RANDOM, RANDOM)
+    errors = read_document(FOGGY, EgoPerception).errors
+    assessed = replace(plain, scene=replace(plain.scene, perception_errors=errors))
+    alone = side_by_side(assessed, [0], [1], [2])
+    assert side_by_side(assessed, [2, 0, 1]) == [alone[2], alone[0], alone[1]]
+    for with_errors, without in zip(play(assessed), play(plain), strict=True):
+        one, other = trace(with_errors), trace(without)
+        assert (one["ego_ghosts"] != "").any()
+        lost = one.loc[one["player"] == "ego", "ego_lost"] == "non_ego"
+        assert with_errors.recorded is not None
+        assert with_errors.recorded.lost_by_ego(1)[: len(lost)].tolist() == lost.tolist()
+        assert one.loc[0, POSE].equals(other.loc[0, POSE])
+        assert not one[POSE].equals(other[POSE])
 
 
 def test_batch__of_more_games_than_tiles(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -125,6 +125,26 @@ def test_open_campaign__a_shield_needs_an_ego_that_decides(tmp_path: Path) -> No
     assert "another ego.driver" in problem.remedy
 
 
+def test_open_campaign__perception_errors_need_an_ego_that_decides(tmp_path: Path) -> None:
+    (tmp_path / "krauss.toml").write_text('kind = "sumo"\nvehicle_type = "ego_car"\n', encoding="utf-8")
+    ego = {"driver": "krauss.toml", "persona": str(CAREFUL), "perception": "radar_camera"}
+    (problem,) = problems_of(write_campaign(tmp_path, ego=ego))
+    assert (problem.key, Path(problem.file).name) == ("ego.perception", "tiny.toml")
+    assert "its driver models know what is there" in problem.message
+
+
+def test_open_campaign__reads_the_perception_errors_that_it_names(tmp_path: Path) -> None:
+    ego = {"persona": str(CAREFUL), "perception": "radar_camera"}
+    campaign = open_campaign(write_campaign(tmp_path, ego=ego))
+    errors = campaign.document.ego.perception_errors
+    assert errors is not None
+    assert errors.latency_s == 0.2
+    assert any(name.endswith("perception/radar_camera.toml") for name in campaign.hashes)
+    (problem,) = problems_of(write_campaign(tmp_path, ego={**ego, "perception": "radar_camra"}))
+    assert problem.key == "ego.perception"
+    assert "did you mean 'radar_camera'" in problem.remedy
+
+
 def test_open_campaign__tells_of_egos_that_learned_in_other_games(tmp_path: Path) -> None:
     card = {"player": "ego", "persona": "hasty", "persona_sha256": "0" * 64, "scene": "merge"}
     for name, scene in (("mine", "paper_merge"), ("other", "crossing")):

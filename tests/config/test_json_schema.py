@@ -28,6 +28,7 @@ SHIPPED = [
     *(("campaign", path) for path in sorted((REPOSITORY / "campaigns").glob("*.toml"))),
     *(("persona", path) for path in sorted((REPOSITORY / "personas").glob("*.toml"))),
     *(("scene", path) for path in sorted((REPOSITORY / "networks").glob("*/scene.toml"))),
+    *(("perception", path) for path in sorted((REPOSITORY / "perception").glob("*.toml"))),
     *(("driver", path) for path in sorted((REPOSITORY / "egos").rglob("*.toml")) if path.name != "pyproject.toml"),
 ]
 each_shipped = pytest.mark.parametrize(

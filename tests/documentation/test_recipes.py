@@ -24,7 +24,18 @@ BLOCK = re.compile(
     r"(?:^`(?P<file>[^`\n]+)`[^\n]*\n\n)?^```(?P<language>\w+)\n(?P<text>.*?)^```", re.DOTALL | re.MULTILINE
 )
 RUN = "reports/mine"  # stands for a run of the reader's
-COPIED = ("harness", "tests", "docs", "networks", "personas", "policies", "campaigns", "egos", "pyproject.toml")
+COPIED = (
+    "harness",
+    "tests",
+    "docs",
+    "networks",
+    "perception",
+    "personas",
+    "policies",
+    "campaigns",
+    "egos",
+    "pyproject.toml",
+)
 
 
 class Block(NamedTuple):

@@ -244,13 +244,13 @@ def test_observation__out_of_its_bounds_is_an_error_row_with_entry_and_step(
         view[q.state.step == STEP, NON_EGO, entry] = value
         return view
 
-    monkeypatch.setattr(harness.environments.arena, "observe", faulty_observe)
+    monkeypatch.setattr(harness.environments.knowledge, "observe", faulty_observe)
     expected = rf"ImpossibleNumber: non_ego sees goal_m as {np.float32(value)} in step {STEP}, not from -1 to 1$"
     assert re.match(expected, error_in(merge))
 
 
 def test_observation__of_a_reset_is_checked_too(merge: OpenScene, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(harness.environments.arena, "observe", lambda q, *perceived: observe(q) + np.float32(2.0))
+    monkeypatch.setattr(harness.environments.knowledge, "observe", lambda q, *perceived: observe(q) + np.float32(2.0))
     assert "in step 0, not from -1 to 1" in error_in(merge)
 
 

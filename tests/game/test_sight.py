@@ -158,3 +158,15 @@ def _on_route(world: World, player: int, before_m: float) -> dict[str, float]:
     )
     row = int(routes.rows(np.full((1, 2), begin_m - before_m))[0, player])
     return {"x_m": routes.x_m[row], "y_m": routes.y_m[row], "heading_rad": routes.heading_rad[row], "speed_mps": 10.0}
+
+
+@pytest.mark.parametrize(("x_m", "is_seen"), [(89.0, True), (91.0, False)])
+def test_visibility__is_how_far_road_users_and_obstacles_are_seen(
+    merge: Any, moment: Moment, x_m: float, is_seen: bool
+) -> None:
+    """30 m from the ego at 60 m; the obstacle, the last body, as the car."""
+    for world in (merge.world, replace(merge.world, hiding=A_LOW_OBSTACLE)):
+        q = moment(world, [EGO, AWAY], [car(x_m)])
+        q.state.visibility_m[:] = 30.0
+        others = [observe(q)[0, 0, LAYOUT.index(f"other{k}_ahead_m")] > 0.5 for k in range(2)]
+        assert any(others) is is_seen

@@ -19,6 +19,7 @@ from harness.campaign.plan.stages import (
     SelectionStage,
     Stage,
     TrainingStage,
+    plays_with_errors,
 )
 from harness.campaign.plan.strategy_stages import training_settings
 from harness.campaign.preflight import OpenCampaign
@@ -75,6 +76,8 @@ def _inputs(campaign: OpenCampaign, stage: Stage) -> dict[str, Any]:
     named = {each.name for each in members_of(*stage.drivers) if isinstance(each, External)}
     if crossplay := sorted(named - {""}):
         inputs["others"] = {name: campaign.other_egos[name].identity for name in crossplay}
+    if document.ego.perception_errors is not None and plays_with_errors(stage):
+        inputs["perception"] = repr(document.ego.perception_errors)
     if any(isinstance(each, Shielded) for each in stage.drivers):
         inputs["shield"] = reference_identity()["rss"]
     if any(isinstance(each, BestOf) for each in stage.drivers):

@@ -132,6 +132,7 @@ class PinnedGames:
                 "found_with": ego.policy.name if ego.policy is not None else failure.arm.partition("_vs_")[0],
                 "alike": failure.alike,
                 "ego_persona": self._copied_persona(ego.persona),
+                "ego_perception": self._players.document.ego.perception,
                 "people": [self._person(each) for each in people],
                 **{name: _start(each) for name, each in starts.items() if each is not None},
             }

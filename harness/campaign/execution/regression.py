@@ -94,6 +94,11 @@ class Regression:
         persona = read_document(resolve(file, game.ego_persona), Persona)
         drivers = (None, *(_person(file, each) for each in game.people))
         start_seed = game.seed if game.start_seed is None else game.start_seed
+        errors = None if game.ego_perception is None else game.ego_perception.errors
+        if errors is not None and (self._ego is None or self._ego.vehicle_type is not None):
+            message = "the ego drives with perception errors, and SUMO's driver models know what is there"
+            raise UsageError.of(file, "ego_perception", message, "name another --ego, or leave out this game")
+        scene = replace(scene, perception_errors=errors)
         return game, persona, SeatedArm(name=game.arm, scene=scene, drivers=drivers, seed=start_seed)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from harness.assessment.seated_arm import SeatedArm
@@ -31,6 +31,7 @@ from harness.drivers.car import car_of
 from harness.drivers.external import find_driver
 from harness.drivers.protocol import Driver
 from harness.errors import UsageError
+from harness.evaluation.strategies import ErrorFreeEgo
 from harness.files import has_digest
 from harness.game.initial_state import member_in_episode
 from harness.game.roles import EGO
@@ -58,9 +59,10 @@ class RunPlayers:
         manifest = folder.manifest()
         driver = None if ego is None else find_driver(ego, Path("--ego"), "", allow_code)
         folder.check_whole(manifest)
-        self.scene: OpenScene = open_scene(folder.scene, driver.vehicle_type if driver is not None else None)
         self._folder, self._ego = folder, driver
         self.document = document = Campaign.model_validate(manifest["campaign"], strict=False)
+        opened = open_scene(folder.scene, driver.vehicle_type if driver is not None else None)
+        self.scene: OpenScene = replace(opened, perception_errors=document.ego.perception_errors)
         self._stages = planned(manifest)
         self._context = RunContext(
             folder=folder,
@@ -78,10 +80,11 @@ class RunPlayers:
 
     def arms(self) -> list[AssessmentStage]:
         """The arms in which an ego meets people, with a driver each that this run can make again: none that other arms
-        chose or weighed, nor a shielded one."""
+        chose or weighed, nor a shielded one, nor one without the perception errors of the campaign."""
         arms = [each for each in self._stages if isinstance(each, AssessmentStage) and each.ego and each.non_ego]
         left_out = BestOf | EquilibriumMixture | Shielded
-        return [arm for arm in arms if not any(isinstance(each, left_out) for each in arm.drivers)]
+        with_errors = [arm for arm in arms if not isinstance(arm.arm.ego, ErrorFreeEgo)]
+        return [arm for arm in with_errors if not any(isinstance(each, left_out) for each in arm.drivers)]
 
     def arm(self, name: str, seed: int) -> AssessmentStage:
         """An arm by name. Raises UsageError if there is none, or if its drivers were chosen by other arms."""

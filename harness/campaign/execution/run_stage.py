@@ -29,7 +29,7 @@ from harness.campaign.plan.stages import (
 )
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign
-from harness.road.scene.open_scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene
 
 
 def carry_out(task: Task, run: StageRun) -> dict[str, Any]:
@@ -38,7 +38,7 @@ def carry_out(task: Task, run: StageRun) -> dict[str, Any]:
         return _carry_out_stage(task, run)
     from harness.campaign.execution.assessment_stage import help_with_arm
 
-    return help_with_arm(task.arm, run, open_scene(run.context.folder.scene, run.context.vehicle_type(task.arm)))
+    return help_with_arm(task.arm, run, run.context.open_scene(task.arm))
 
 
 def _carry_out_stage(stage: Stage, run: StageRun) -> dict[str, Any]:
@@ -54,8 +54,7 @@ def _carry_out_stage(stage: Stage, run: StageRun) -> dict[str, Any]:
             return _leave(stage, folder, key, pair, f"{pair} is an approximate equilibrium")
         case RejectionGate(answer=answer):
             return _leave(stage, folder, key, answer, f"{answer} was taken, and no answer was rejected")
-    scene = open_scene(folder.scene, context.vehicle_type(stage))
-    facts, files = _make(stage, run, scene)
+    facts, files = _make(stage, run, context.open_scene(stage))
     facts["seconds"] = round(time.monotonic() - started_s, 1)
     facts["finished_on"] = time.strftime("%Y-%m-%d", time.gmtime())
     folder.finish(stage.id, key, facts, files)

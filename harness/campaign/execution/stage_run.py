@@ -14,13 +14,13 @@ import time
 import traceback
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 from harness.campaign.plan.planned_drivers import External
-from harness.campaign.plan.stages import AssessmentStage, Stage
+from harness.campaign.plan.stages import AssessmentStage, Stage, plays_with_errors
 from harness.campaign.preflight import OpenCampaign
 from harness.campaign.storage.locks import held_by_worker
 from harness.campaign.storage.run_folder import RunFolder
@@ -30,6 +30,7 @@ from harness.config.persona import Persona
 from harness.drivers.external import ExternalDriver
 from harness.errors import HarnessError, is_of_memory, of_system, short_of_memory
 from harness.files import make_folder
+from harness.road.scene.open_scene import OpenScene, open_scene
 
 SEGMENT_EPISODES = 5
 """Games of an arm that are stored together: one worker plays them."""
@@ -70,7 +71,13 @@ class RunContext:
         assert driver is not None
         return driver
 
-    def vehicle_type(self, stage: Stage) -> str | None:
+    def open_scene(self, stage: Stage) -> OpenScene:
+        """The scene as a stage plays on it, with the ego's vehicle type and perception errors."""
+        scene = open_scene(self.folder.scene, self._vehicle_type(stage))
+        errors = self.document.ego.perception_errors if plays_with_errors(stage) else None
+        return replace(scene, perception_errors=errors)
+
+    def _vehicle_type(self, stage: Stage) -> str | None:
         """The vehicle type of the ego in a stage; None: the scene's."""
         for driver in stage.drivers:
             if isinstance(driver, External) and driver.name:

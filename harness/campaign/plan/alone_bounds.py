@@ -11,6 +11,7 @@ from harness.evaluation.strategies import (
     Arm,
     BestResponse,
     EgoStrategy,
+    ErrorFreeEgo,
     NaiveEgo,
     OtherEgo,
     PersonaNonEgo,
@@ -28,8 +29,9 @@ def alone_bounds(campaign: Campaign, *arms: Arm) -> tuple[AloneBound, ...]:
     """What the players of these arms have to achieve alone, each once.
 
     A population or crowd stands for its members. SUMO's own driver as non-ego, the further egos of a cross-play and
-    rejected answers have no arm alone, and a shielded ego is judged by the one without its shield: nothing is asked of
-    them. A best response is a change of a player's strategy: its arm asks what the pair asks.
+    rejected answers have no arm alone. A shielded ego is judged by the one without its shield, and one without
+    perception errors by the one with them: nothing is asked of them. A best response is a change of a player's
+    strategy: its arm asks what the pair asks.
     """
     found = [
         bound
@@ -56,7 +58,7 @@ def bound_of(campaign: Campaign, stage: TrainingStage) -> AloneBound | None:
 def _bounds(campaign: Campaign, strategy: Strategy) -> Iterator[AloneBound]:
     asked = campaign.competence
     match strategy:
-        case SumoNonEgo() | OtherEgo() | BestResponse() | RoundAnswer() | ShieldedEgo():
+        case SumoNonEgo() | OtherEgo() | BestResponse() | RoundAnswer() | ShieldedEgo() | ErrorFreeEgo():
             return
         case PersonaNonEgo(persona=persona):
             mixed = campaign.mixed_people.get(persona, ())

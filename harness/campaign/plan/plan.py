@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from harness.campaign.plan.attribution_arms import plan_attribution
@@ -18,8 +18,9 @@ from harness.config.campaign import Campaign
 from harness.config.traits import UNREAD, PersonTraits
 from harness.evaluation.strategies import (
     EgoStrategy,
-    NaiveEgo,
+    ErrorFreeEgo,
     OtherEgo,
+    OwnEgo,
     PersonaNonEgo,
     ReconfiguredEgo,
     RetrainedEgo,
@@ -50,14 +51,14 @@ def _plan_seed(of: SeedStages, personas: Sequence[str], tunable: bool) -> list[S
     rounds = [persona_rounds(of, persona, tunable) for persona in personas]
     stages = [*plan_paper_rounds(of, personas), *plan_robust(of, personas)]
     stages += plan_searches(of, personas) if tunable else []
-    shielded = _plan_shielded(of.campaign, stages)
+    compared = [*_plan_shielded(of.campaign, stages), *_plan_error_free(of.campaign, stages)]
     stages += [stage for each in rounds for stage in each.stages]
     judged = list(stages)
     stages += _plan_crossplay(of, rounds)
     stages += _plan_responses(of, rounds, stages)
     stages += _plan_preventability(of.campaign, judged)
     stages += plan_attribution(of)
-    stages += shielded
+    stages += compared
     return list(dict.fromkeys(stages))
 
 
@@ -87,13 +88,23 @@ def _plan_preventability(campaign: Campaign, stages: Iterable[Stage]) -> list[Pr
 def _plan_shielded(campaign: Campaign, stages: Iterable[Stage]) -> list[AssessmentStage]:
     """Each of these arms of an ego with the campaign's shield, too: the same policy in the same games."""
     rule, found = campaign.ego.shield, []
-    for stage in stages:
-        ego = stage.arm.ego if isinstance(stage, AssessmentStage) else None
-        if rule is not None and isinstance(ego, NaiveEgo | RetrainedEgo | ReconfiguredEgo | RobustEgo):
-            assert isinstance(stage, AssessmentStage)
-            side = (Shielded(members=members_of(*stage.ego), rule=rule),)  # type: ignore[arg-type]
-            found.append(replace(stage, arm=replace(stage.arm, ego=ShieldedEgo(of=ego)), ego=side))
+    for stage, ego in _of_own_egos(stages) if rule is not None else ():
+        side = (Shielded(members=members_of(*stage.ego), rule=rule),)  # type: ignore[arg-type]
+        found.append(replace(stage, arm=replace(stage.arm, ego=ShieldedEgo(of=ego)), ego=side))
     return found
+
+
+def _plan_error_free(campaign: Campaign, stages: Iterable[Stage]) -> list[AssessmentStage]:
+    """Each of these arms of an ego without the campaign's perception errors, too: the same policy in the same games."""
+    own = _of_own_egos(stages) if campaign.ego.perception is not None else ()
+    return [replace(stage, arm=replace(stage.arm, ego=ErrorFreeEgo(of=ego))) for stage, ego in own]
+
+
+def _of_own_egos(stages: Iterable[Stage]) -> Iterator[tuple[AssessmentStage, OwnEgo]]:
+    """The arms with an ego of the campaign among the stages, each with this ego."""
+    for stage in stages:
+        if isinstance(stage, AssessmentStage) and isinstance(stage.arm.ego, OwnEgo):
+            yield stage, stage.arm.ego
 
 
 def _plan_crossplay(of: SeedStages, rounds: Sequence[PersonaRounds]) -> list[AssessmentStage]:

@@ -21,6 +21,7 @@ from harness.evaluation.competence import AloneBound
 from harness.evaluation.strategies import (
     Arm,
     BestResponse,
+    ErrorFreeEgo,
     PersonaNonEgo,
     ReconfiguredEgo,
     RetrainedEgo,
@@ -250,6 +251,17 @@ class PreventabilityStage(_Stage):
 
 
 Stage = TrainingStage | AssessmentStage | SearchStage | SelectionStage | PreventabilityStage
+
+
+def plays_with_errors(stage: Stage) -> bool:
+    """Whether an ego plays in a stage with the perception errors of the campaign. Reference drivers have none."""
+    match stage:
+        case AssessmentStage(arm=arm):
+            return arm.ego is not None and not isinstance(arm.ego, ErrorFreeEgo)
+        case PreventabilityStage():
+            return False
+        case _:
+            return True
 
 
 def stage_id(name: str, seed: int) -> str:

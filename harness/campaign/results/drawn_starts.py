@@ -25,6 +25,7 @@ def drawn_starts(scene: OpenScene, start_seed: int, episodes: Iterable[int]) -> 
     position_m, speed_mps = (np.array([getattr(each, name) for each in drawn]) for name in ("position_m", "speed_mps"))
     found = start_quantities(scene.places, position_m, speed_mps)
     found["friction"] = [each.friction for each in drawn]
+    found["visibility_m"] = [each.visibility_m for each in drawn]
     found["speed_limit_share"] = [each.limit_share for each in drawn]
     if len(scene.world.right_of_way.signal_links):
         found["signal_place"] = [each.signal_place for each in drawn]

@@ -20,6 +20,7 @@ from harness.campaign.storage.manifest import is_tuned
 from harness.evaluation.comparisons.acceptance_checks import Evidence, judge
 from harness.evaluation.comparisons.comparison import compare, games_by_arm
 from harness.evaluation.comparisons.over_trainings import compare_over_trainings
+from harness.evaluation.comparisons.perception_comparison import compare_perception
 from harness.evaluation.comparisons.preventability import count_prevented
 from harness.evaluation.comparisons.shield_comparison import compare_shielded
 from harness.evaluation.comparisons.summary import summarise
@@ -54,6 +55,7 @@ def evaluated(run: ReadRun) -> RunTables:
         reconfiguration=run.reconfiguration,
         selections=run.selections,
         shields=compare_shielded(_arms(run), run.episodes),
+        perception=compare_perception(_arms(run), run.episodes, len(run.campaign.seeds)),
         manoeuvres=run.manoeuvres,
         causes=run.causes,
         takeovers=run.takeovers,
@@ -89,6 +91,7 @@ def csv_tables(run: ReadRun, tables: RunTables) -> dict[str, pd.DataFrame]:
     names += ["populations"] if run.campaign.population else []
     names += ["reconfiguration"] if is_tuned(run.manifest) else []
     names += ["shields"] if run.campaign.ego.shield is not None else []
+    names += ["perception"] if run.campaign.ego.perception is not None else []
     names += ["selections"] if len(run.selections) else []
     found = {"conduct": run.conduct} | {name: getattr(tables, name) for name in names}
     return found | (tables.game.tables if tables.game is not None else {})

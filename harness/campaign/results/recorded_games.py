@@ -18,6 +18,7 @@ from harness.evaluation.strategies import Arm, counterparts
 from harness.evaluation.trace_file import TraceReader
 from harness.evaluation.worst_first import worst_first
 from harness.game.arrays import FloatArray
+from harness.game.roles import EGO
 from harness.game.sight import TALL_WIDTH_M
 from harness.replay import choose_games
 from harness.replay.contacts import contacts
@@ -144,8 +145,22 @@ def tracks_of(trace: pd.DataFrame, scene: OpenScene, game: Any, takeover: pd.Dat
             for piece in presences(rows)
         ],
         reference=None if takeover is None else _reference(takeover, types),
+        perceived=_perceived(trace, scene.world.roles[EGO]),
         touches=[(contact.time_s, contact.x_m, contact.y_m) for contact in contacts(trace, types, scene.rail_lines)],
     )
+
+
+def _perceived(trace: pd.DataFrame, ego: str) -> list[tuple[int, list[str], int]]:
+    """`GameTracks.perceived` of a trace."""
+    found = list[tuple[int, list[str], int]]()
+    if not {"ego_lost", "ego_ghosts"} <= {*trace.columns}:
+        return found
+    rows = trace.loc[trace["player"] == ego, ["step", "ego_lost", "ego_ghosts"]].sort_values("step")
+    for step, lost, ghosts in rows.itertuples(index=False):
+        said = (lost.split(), len(ghosts.split("; ")) if ghosts else 0)
+        if not found or found[-1][1:] != said:
+            found.append((int(step), *said))
+    return found
 
 
 def _reference(takeover: pd.DataFrame, types: Mapping[str, DrawnVehicle]) -> Reference:

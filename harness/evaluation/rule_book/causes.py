@@ -197,11 +197,12 @@ def _reaction(course: Course, begin: int, last: int) -> tuple[str, float]:
 
 
 def _seen(course: Course, other: int, begin: int, last: int) -> BoolArray:
-    """[N] whether the ego looked and could see a body, from a step to the end."""
+    """[N] whether the ego looked, could see a body and had not lost it, from a step to the end."""
     bodies, steps = course.game.bodies, slice(begin, last + 1)
     away_m = np.hypot(*(each[steps, other] - each[steps, EGO] for each in (bodies.x_m, bodies.y_m)))
     lapsed, hidden = course.quantities.state.lapsed[steps, EGO], course.quantities.hidden[steps, EGO, other]
-    return np.asarray(~lapsed & ~hidden & (away_m <= at.SEEN_M))
+    lost = course.game.lost_by_ego(other)[steps]
+    return np.asarray(~lapsed & ~hidden & ~lost & (away_m <= at.SEEN_M))
 
 
 def _hidden_until_s(course: Course, other: int, begin: int, last: int) -> float:

@@ -13,6 +13,7 @@ from harness.config.scene import Scene
 from harness.game.arrays import FloatArray
 from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import StartDistribution, of_people
+from harness.game.perception_errors import PerceptionErrors
 from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles
 from harness.game.seeding import between
 from harness.game.start_range import StartRange
@@ -55,6 +56,7 @@ class OpenScene:
     road_behind: RoadBehind = NO_ROAD  # on which somebody may follow the ego
     stripes: tuple[FloatArray, ...] = ()  # [5, 2] each, of the marked crossings
     roads_m: FloatArray | None = None  # [n, 3] points of the players' roads; None: no other road passes over or under
+    perception_errors: PerceptionErrors | None = None  # of the ego in games on this scene; None: it sees what is there
 
     @property
     def net_file(self) -> Path:
@@ -138,6 +140,7 @@ class OpenScene:
             step_s=self.world.step_s,
             routes=self.world.road.routes,
             friction=varies.friction or (self.document.friction, self.document.friction),
+            visibility_m=varies.visibility_m or (self.document.visibility_m, self.document.visibility_m),
             limit_share=varies.speed_limit_share or (1.0, 1.0),
             signal_place=varies.signal_place or (0.0, 1.0),
             along_route_share=along_route_share,

@@ -11,7 +11,7 @@ import pytest
 from harness.campaign.plan.paper_rounds import questions
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.planned_drivers import Shielded, SumoDriven, Trained, description
-from harness.campaign.plan.stages import AssessmentStage, PreventabilityStage, TrainingStage
+from harness.campaign.plan.stages import AssessmentStage, PreventabilityStage, TrainingStage, plays_with_errors
 from harness.config.traits import PersonTraits
 from harness.drivers.policy_file import write_policy
 from harness.evaluation.strategies import ATTENTIVE
@@ -65,6 +65,18 @@ def test_plan__a_shield_plays_each_arm_of_an_ego_once_more_and_changes_no_other_
     arm = stages["shielded_retrained_vs_anna"]
     assert arm.ego == (Shielded(members=(Trained(stage="retrained_anna-seed1"),), rule="rss"),)
     assert arm.needs == without["retrained_vs_anna"].needs
+
+
+def test_plan__each_arm_of_an_ego_is_played_without_its_perception_errors_too() -> None:
+    perception = {"name": "mine", "description": "Something to test with."}
+    without, stages = (stages_of("anna", ego=ego) for ego in ({}, {"perception": perception}))
+    free = {f"error_free_{name}" for name in ("naive_alone", "naive_vs_sumo", "naive_vs_anna", "retrained_vs_anna")}
+    assert stages.keys() - without.keys() == {*free, "error_free_retrained_alone_anna"}
+    assert stages["error_free_retrained_vs_anna"].sides == stages["retrained_vs_anna"].sides
+    arms = {name: stage for name, stage in stages.items() if isinstance(stage, AssessmentStage)}
+    assert {name for name, arm in arms.items() if not plays_with_errors(arm)} == {
+        name for name in arms if name.startswith("error_free") or name == "anna_alone"
+    }
 
 
 def test_plan__a_persona_with_lapses_is_also_assessed_alone_with_its_eyes_on_the_road() -> None:
