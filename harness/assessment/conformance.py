@@ -110,7 +110,7 @@ class _CheckedDriver:
         self._driver, self._seconds = driver, seconds
         self.takes_over = driver.takes_over
         self.decisions: list[Decision] = []
-        self._views: list[CartesianView] = []
+        self._views: list[CartesianView | None] = []
 
     def reset(self, games: IntArray) -> None:
         self._driver.reset(games)

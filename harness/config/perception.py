@@ -5,16 +5,21 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from harness.config.persona import Source
 from harness.config.scene import Name
-from harness.config.toml_reading import Document, Interval, Mistakes
+from harness.config.toml_reading import Document, Mistakes, ordered
 from harness.game import perception_errors as game
 
 _PerMin = Annotated[float, Field(ge=0.0, le=600.0)]
 _DurationS = Annotated[float, Field(ge=0.05, le=600.0)]
+_Place = Annotated[float, Field(ge=-120.0, le=120.0)]
+_Speed = Annotated[float, Field(ge=-60.0, le=60.0)]
+_Places = Annotated[tuple[_Place, _Place], AfterValidator(ordered)]
+_Speeds = Annotated[tuple[_Speed, _Speed], AfterValidator(ordered)]
 MOST_EXPECTED = 2.0
+"""Ghosts at a time, on average."""
 
 
 class Loss(Document):
@@ -35,11 +40,11 @@ class Ghosts(Document):
     """How many appear per minute (exponential distribution)."""
     mean_lifetime_s: _DurationS
     """How long one is seen, on average (exponential distribution)."""
-    ahead_m: Interval
+    ahead_m: _Places
     """Range of the place where one appears, from the ego's centre along its heading."""
-    left_m: Interval
+    left_m: _Places
     """The same across, to the left."""
-    speed_mps: Interval = (0.0, 0.0)
+    speed_mps: _Speeds = (0.0, 0.0)
     """Range of its speed, which it keeps, in the heading of the ego where it appears."""
     length_m: float = Field(4.5, gt=0.0, le=30.0)
     """Length of its body."""

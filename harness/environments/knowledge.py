@@ -7,12 +7,12 @@ from collections.abc import Mapping
 
 from harness.environments.nearby_bodies import NearbyBodies
 from harness.game.arrays import BoolArray, FloatArray, IntArray
-from harness.game.field_of_view import Seen, as_it_is
+from harness.game.field_of_view import Seen
 from harness.game.human_factors import PlayersLimits
 from harness.game.initial_state import InitialState
 from harness.game.memory import Memory, as_they_are
 from harness.game.object_list import ObjectLists
-from harness.game.observation import observe
+from harness.game.observation import as_it_is, observe
 from harness.game.quantities import Quantities
 from harness.game.roles import EGO
 from harness.game.state import State

@@ -17,12 +17,13 @@ import numpy as np
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.field_of_view import Seen
 from harness.game.jit import compiled
+from harness.game.meetings import Meetings
 from harness.game.memory import Perceived
 from harness.game.perception_errors import (
     LOSS,
     MOST_GHOSTS,
+    NO_GHOSTS,
     SPEED,
-    GhostPlan,
     PerceptionErrors,
     X,
     Y,
@@ -73,7 +74,7 @@ class ObjectLists:
         self._listed: BoolArray = np.zeros((kept, games, _ROOM), dtype=bool)
         self._names = [dict[str, int]() for _ in range(games)]
         self._parts = [tuple[str | int, ...]() for _ in range(games)]
-        self._ghosts = [GhostPlan(*np.zeros((3, 0)), np.zeros((0, 3)))] * games
+        self._ghosts = [NO_GHOSTS] * games
         self._next_ghost = np.tile((0, steps + 1), (games, 1))  # its number in the plan, and its first step
         self._ghost: FloatArray = np.zeros((games, MOST_GHOSTS, 5))
         """x_m, y_m, heading_rad, speed_mps, and the step in which it goes."""
@@ -190,7 +191,7 @@ class ObjectLists:
             bodies=bodies,
             motion=np.concatenate((seen.motion, motion), axis=3),
             hidden=np.concatenate((seen.hidden, hidden), axis=2),
-            meetings=seen.meetings._make(meetings),
+            meetings=Meetings(*meetings),
         )
 
 

@@ -19,11 +19,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
-from harness.game.field_of_view import SEEN_M, Eyes, Seen, as_it_is, in_view
+from harness.game.field_of_view import SEEN_M, Eyes, Seen, in_view
 from harness.game.jit import compiled, inlined
 from harness.game.junctions import Control, Signal, StopLines
 from harness.game.meetings import Meetings
-from harness.game.memory import Perceived
+from harness.game.memory import Perceived, as_they_are
 from harness.game.observation_layout import BEHIND, COMPRESSED, ENTRIES, FIRST_OTHER, OTHER, OTHERS, OWN, SCALE, SIZE
 from harness.game.quantities import Quantities
 from harness.game.road import AHEAD_M, Routes
@@ -75,6 +75,11 @@ class _Views(NamedTuple):
 
 
 _columns = attrgetter(*_Players._fields)  # plain tuples: numba takes them apart three times as fast as records
+
+
+def as_it_is(q: Quantities) -> Seen:
+    """The bodies as they are."""
+    return Seen(q.bodies, as_they_are(q.bodies, q.state.present.shape[1]), q.hidden, q.meetings)
 
 
 def observe(q: Quantities, seen: Seen | None = None) -> FloatArray:

@@ -78,6 +78,9 @@ class GhostPlan:
     """[N, 3] ahead_m and left_m of the ego in the first step, and speed_mps."""
 
 
+NO_GHOSTS = GhostPlan(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros((0, 3)))
+
+
 def draw_object(errors: PerceptionErrors, steps: int, step_s: float, name: str, *parts: str | int) -> FloatArray:
     """[T, 4] the random numbers of an object in a game of T steps: `LOSS` is uniform, the others are normal processes
     of variance 1."""
@@ -104,4 +107,4 @@ def draw_ghosts(ghosts: Ghosts, steps: int, step_s: float, *parts: str | int) ->
             free_from[place] = end
             rows.append([place, first, end, *pose])
     columns = np.array(rows).reshape(-1, 6)
-    return GhostPlan(*columns[:, :3].T, columns[:, 3:])
+    return GhostPlan(columns[:, 0], columns[:, 1], columns[:, 2], columns[:, 3:])
