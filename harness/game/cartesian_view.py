@@ -137,9 +137,12 @@ class CartesianView:
         """The view of a player that stands alone at the start of its route, with signals that are off."""
         start, following = road.route_line[:2]
         off = SeenSignal(state=SIGNAL_STATES[Signal.OFF], since_s=0.0)
-        at_rest = dict.fromkeys(("time_s", "speed_mps", "acceleration_mps2", "steering_rad", "station_m"), 0.0)
         return cls(
-            **at_rest,
+            time_s=0.0,
+            speed_mps=0.0,
+            acceleration_mps2=0.0,
+            steering_rad=0.0,
+            station_m=0.0,
             x_m=float(start[0]),
             y_m=float(start[1]),
             heading_rad=float(np.arctan2(*(following - start)[::-1])),
