@@ -67,7 +67,7 @@ def decide(view, road, speeds, hello):
         wanted_m = STANDSTILL_M + max(speed * parameters["time_gap_s"] + closing, 0.0)
         most = min(most, MOST_MPS2 * (1.0 - free - (wanted_m / max(end_m - front_m, 0.1)) ** 2))
     wheelbase, heading = limits["wheelbase_m"], view["heading_rad"]
-    x, y = line[min(first + round((4.0 + 0.4 * speed) / SPACING_M), len(line) - 1)]
+    x, y = line[min(first + round((1.5 + 0.3 * speed) / SPACING_M), len(line) - 1)]
     x -= view["x_m"] - 0.5 * wheelbase * math.cos(heading)  # from the rear axle
     y -= view["y_m"] - 0.5 * wheelbase * math.sin(heading)
     steering = math.atan2(2 * wheelbase * math.sin(math.atan2(y, x) - heading), math.hypot(x, y))
