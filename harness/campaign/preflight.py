@@ -21,7 +21,7 @@ from harness.campaign.plan.stages import Stage
 from harness.campaign.plan.strategy_stages import crossplay_name
 from harness.campaign.trained_policies import check_policies, find_policies
 from harness.config.campaign import LEARNED, SUMO, Campaign, DocumentPath, Ego
-from harness.config.perception import EgoPerception
+from harness.config.ego_perception import EgoPerception
 from harness.config.persona import Persona
 from harness.config.toml_reading import Document, read_document
 from harness.config.traits import traits_of

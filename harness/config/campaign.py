@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
-from harness.config.perception import EgoPerception
+from harness.config.ego_perception import EgoPerception
 from harness.config.scene import Name
 from harness.config.toml_reading import PATH, TABLE, Document, Mistakes
 from harness.config.training import NaiveTraining, NonEgoTraining, Reconfiguration, Retraining, Training

@@ -17,7 +17,7 @@ from pydantic.json_schema import GenerateJsonSchema
 
 from harness.config.campaign import Campaign
 from harness.config.driver import DriverDocument
-from harness.config.perception import EgoPerception
+from harness.config.ego_perception import EgoPerception
 from harness.config.persona import Persona
 from harness.config.scene import Scene
 from harness.config.toml_reading import nearest

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from harness.config.campaign import DocumentPath, Seed
-from harness.config.perception import EgoPerception
+from harness.config.ego_perception import EgoPerception
 from harness.config.toml_reading import Document
 from harness.game.roles import MOST_PEOPLE
 

@@ -37,7 +37,7 @@ class Noise:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ghosts:
+class GhostRates:
     """Objects that are not there. Intervals are drawn from uniformly."""
 
     per_min: float
@@ -64,7 +64,7 @@ class PerceptionErrors:
     """Of x and of y, in metres."""
     speed: Noise = Noise()
     """In m/s."""
-    ghosts: Ghosts | None = None
+    ghosts: GhostRates | None = None
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def draw_object(errors: PerceptionErrors, steps: int, step_s: float, name: str, 
     return np.concatenate((uniform, autocorrelated(normal[:, :2], position), autocorrelated(normal[:, 2:], speed)), 1)
 
 
-def draw_ghosts(ghosts: Ghosts, steps: int, step_s: float, *parts: str | int) -> GhostPlan:
+def draw_ghosts(ghosts: GhostRates, steps: int, step_s: float, *parts: str | int) -> GhostPlan:
     """Draw the ghosts of a game of `steps` steps. As many are there at its start as at any other time."""
     generator, rows = generator_of(*parts, "perception", "ghosts"), list[list[float]]()
     free_from = [0] * MOST_GHOSTS

@@ -12,7 +12,7 @@ import pytest
 
 from harness.assessment.rollout import assess_batches, plays_side_by_side
 from harness.assessment.seated_arm import SeatedArm
-from harness.config.perception import EgoPerception
+from harness.config.ego_perception import EgoPerception
 from harness.config.scene import Varies
 from harness.config.toml_reading import read_document
 from harness.drivers.car import car_of

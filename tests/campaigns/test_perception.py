@@ -8,7 +8,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from harness.config.perception import EgoPerception
+from harness.config.ego_perception import EgoPerception
 from harness.config.toml_reading import read_document
 from harness.evaluation.trace_columns import PERCEIVED
 from harness.evaluation.trace_file import SCHEMA

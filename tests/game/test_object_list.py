@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from harness.game.memory import as_they_are
 from harness.game.object_list import ObjectLists
 from harness.game.observation import Seen, observe
-from harness.game.perception_errors import Ghosts, Noise, PerceptionErrors, draw_ghosts, draw_object
+from harness.game.perception_errors import GhostRates, Noise, PerceptionErrors, draw_ghosts, draw_object
 from harness.game.quantities import Quantities
 from harness.road.scene.open_scene import OpenScene
 from tests.support.moments import FAR, Moment, car
@@ -23,7 +23,7 @@ STEPS, STEP_S = 20, 0.1
 GAME = np.array([0])
 PARTS = ("assessment", 1, "episode", 0)
 LOSSES = ((0.0, 6.0, 5.0), (100.0, 30.0, 10.0))
-STANDS_THERE = Ghosts(
+STANDS_THERE = GhostRates(
     per_min=600.0,
     mean_lifetime_s=0.2,
     ahead_m=(20.0, 20.0),

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from harness.config.campaign import Campaign
-from harness.config.perception import EgoPerception
+from harness.config.ego_perception import EgoPerception
 from harness.config.toml_reading import read_document
 from harness.errors import Problem, UsageError
 from harness.game.perception_errors import PerceptionErrors

@@ -127,5 +127,5 @@ class EgoPerception(Document):
             losses=tuple((each.distance_m, each.losses_per_min, each.mean_duration_s) for each in self.loss),
             position=game.Noise(sd=position.sd_m, sd_per_m=position.sd_share, persistence_s=position.persistence_s),
             speed=game.Noise(sd=speed.sd_mps, sd_per_m=speed.sd_per_s, persistence_s=speed.persistence_s),
-            ghosts=None if ghosts is None else game.Ghosts(**ghosts.model_dump()),
+            ghosts=None if ghosts is None else game.GhostRates(**ghosts.model_dump()),
         )
