@@ -28,7 +28,6 @@ class ShieldedDriver:
     takes_over = True
 
     def __init__(self, driver: Driver, world: World) -> None:
-        """The driver is that of the ego in this world."""
         self._driver, self._car = driver, car_of(world, EGO)
         self._rule = reference_driver("rss", self._car, lane_width_of(world))
         self._braking_mps2 = Rss().full_braking_g * GRAVITY_MPS2
