@@ -15,11 +15,10 @@ from harness.game.quantities import Quantities
 from harness.game.state import Bodies, State
 from harness.game.world import World
 from harness.road.scene.open_scene import OpenScene, open_scene
-from tests.support.repository import REPOSITORY
+from tests.support.repository import REPOSITORY, slow_tests
+from tests.support.roads import nearest_station_m
 from tests.support.scenes import build_scene, run_sumo_program
 from tests.support.shared import shared_folder
-from tests.support.slow import slow_tests
-from tests.support.stations import nearest_station_m
 
 # A busy machine exceeds any deadline now and then, and makes examples slowly. They are the same in every run.
 settings.register_profile("harness", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])

@@ -16,9 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.repository import REPOSITORY
-from tests.support.slow import slow_tests
-from tests.support.sources import PACKAGE, SOURCES, label, tree_of
+from tests.support.repository import PACKAGE, REPOSITORY, SOURCES, label, slow_tests, tree_of
 
 # Which room may import which others, from the lowest floor to the highest. A room is a module or folder directly under
 # harness/, or a folder in one that has a line of its own. A new arrow is a decision: add it here first.

@@ -21,9 +21,8 @@ import yaml
 
 from harness.errors import NOT_ACCEPTED
 from harness.shipped_documents import Kind, shipped_names, shipped_policies
-from tests.support.repository import REPOSITORY
+from tests.support.repository import REPOSITORY, SOURCES, tree_of
 from tests.support.shipped import FOLDER, NAIVE_BY_NAME, PERSON_BY_NAME, RETRAINED, SPEEDY, TWO_GAMES
-from tests.support.sources import SOURCES, tree_of
 
 if sys.version_info >= (3, 11):
     import tomllib

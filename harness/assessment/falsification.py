@@ -24,8 +24,8 @@ from harness.assessment.seated_arm import SeatedArm
 from harness.assessment.start_trials import start_at
 from harness.errors import StageFailed
 from harness.game.arrays import FloatArray
+from harness.game.follower import RANGES, ordinary_driver_at
 from harness.game.initial_state import InitialState
-from harness.game.ordinary_driver import RANGES, ordinary_driver_at
 from harness.game.seeding import generator_of, seed_of
 from harness.game.start_range import starts_in
 

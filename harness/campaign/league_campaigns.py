@@ -88,7 +88,6 @@ def _scene_at(written: str) -> Path:
 
 
 def _campaigns(scene: Path, driver: str, episodes: int) -> Iterator[Mapping[str, Any]]:
-    """The documents of the campaigns of a scene."""
     shared = {"scene": str(scene), "ego": {"driver": driver}, "assessment": {"episodes": episodes}}
     people = people_of(scene)
     if not people:

@@ -110,8 +110,8 @@ def check(
 
 def _check_campaign(file: Path, allow_code: bool, as_json: bool, console: Console) -> None:
     from harness.campaign.execution.repeat_check import varying_drivers
+    from harness.campaign.plan.paper_rounds import family_lines, family_records, planned_families
     from harness.campaign.plan.persona_remarks import ego_persona_remarks, persona_remarks
-    from harness.campaign.plan.planned_families import family_lines, family_records, planned_families
     from harness.campaign.preflight import open_campaign
     from harness.config.campaign import LEARNED
     from harness.errors import plain

@@ -62,7 +62,6 @@ class Car:
 
 
 def car_of(world: World, player: int) -> Car:
-    """A player's car."""
     arrays = {name: value for name, value in world.actuators._asdict().items() if name != "friction"}
     own = world.actuators._replace(**{name: value[player : player + 1] for name, value in arrays.items()})
     return Car(

@@ -20,14 +20,13 @@ from harness.environments.nearby_bodies import NearbyBodies
 from harness.environments.seats import Seat, with_walkers
 from harness.environments.sumo_players import read_signals, read_sumo_players
 from harness.game.arrays import BoolArray, FloatArray, IntArray
-from harness.game.bicycle import Requested, move, requests
+from harness.game.bicycle import Requested, along_rail, move, requests, slide
 from harness.game.human_factors import PlayersLimits, held_steering_rad, release_controls
 from harness.game.initial_state import InitialState
 from harness.game.observation_layout import SIZE
 from harness.game.outcome import Outcome
 from harness.game.quantities import Quantities
 from harness.game.sanity_checks import check_observation, check_step, checked_decisions
-from harness.game.sliding import along_rail, slide
 from harness.game.state import State, terminations
 from harness.game.walking import walk
 from harness.road.demand.route_file import Departure

@@ -16,7 +16,7 @@ from pettingzoo import ParallelEnv
 
 from harness.drivers.policy_file import ACTIONS
 from harness.environments.arena import LiveSimulation, Seat
-from harness.environments.seating import PERSONA, SCENE, Place, opened_scene, read_persona, seating_of
+from harness.environments.seats import PERSONA, SCENE, Place, opened_scene, read_persona, seating_of
 from harness.environments.single_game import RENDER_MODES, Info, SingleGame, space_of
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray

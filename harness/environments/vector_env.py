@@ -136,7 +136,6 @@ class ArenaVecEnv(GamesVecEnv):
         return finished
 
     def reload(self, seed: int) -> None:
-        """Reload SUMO with a seed."""
         self.arena.reload(seed)
 
     def close(self) -> None:

@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
-from harness.evaluation.attribution_columns import ATTRIBUTION, UNDECIDED
 from harness.evaluation.column import (
     COUNT,
     EXACT,
@@ -21,16 +20,25 @@ from harness.evaluation.column import (
     Column,
     rate,
 )
-from harness.evaluation.equilibria_columns import EQUILIBRIA
-from harness.evaluation.falsification_columns import FALSIFICATION, SEARCHES
-from harness.evaluation.league_columns import LEAGUE_MEASURES, LEAGUE_PAIRING, LEAGUE_RANKS
 from harness.evaluation.measured_game import METRICS_OF_CONDUCT, METRICS_OF_GAMES, METRICS_OF_PLAYERS
-from harness.evaluation.over_trainings_columns import OVER_TRAININGS
-from harness.evaluation.perception_columns import PERCEPTION
-from harness.evaluation.preventability_columns import PREVENTABILITY, REFERENCE_DRIVERS, TAKEOVERS
-from harness.evaluation.selection_columns import SELECTIONS
+from harness.evaluation.result_columns import (
+    ATTRIBUTION,
+    EQUILIBRIA,
+    FALSIFICATION,
+    LEAGUE_MEASURES,
+    LEAGUE_PAIRING,
+    LEAGUE_RANKS,
+    OVER_TRAININGS,
+    PERCEPTION,
+    PREVENTABILITY,
+    REFERENCE_DRIVERS,
+    SEARCHES,
+    SELECTIONS,
+    SHIELDS,
+    TAKEOVERS,
+    UNDECIDED,
+)
 from harness.evaluation.severity.closeness import CRITERIA
-from harness.evaluation.shield_columns import SHIELDS
 
 _T = "95 % t interval"
 _PAPER = "the paper, section 4.2"

@@ -72,7 +72,6 @@ class RecordedGame:
         return Bodies(x_m, y_m, heading_rad, speed_mps, length_m, width_m, present)
 
     def box(self, step: int, body: int) -> Box:
-        """A body's box."""
         return Box(*(float(getattr(self.bodies, name)[step, body]) for name in Box._fields))
 
     def velocity_mps(self, step: int, body: int) -> FloatArray:

@@ -1,4 +1,5 @@
-"""The vehicle that follows the ego in a share of the games. SUMO drives it; each game draws its driver here.
+"""Vehicles that SUMO drives with parameters of one game: the one that follows the ego in a share of the games, and the
+one in the place of a person where a search varies how it drives.
 
 Without a vehicle behind it, an ego brakes as hard as it likes at no cost.
 """
@@ -7,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from harness.game.arrays import FloatArray
 from harness.game.seeding import between, generator_of
 
 FOLLOWER = "follower"
@@ -41,3 +43,32 @@ def draw_follower(share: float, *parts: str | int) -> Follower | None:
     if followed >= share:
         return None
     return Follower(time_gap_s=between(TIME_GAPS_S, time_gap), reaction_s=between(REACTIONS_S, reaction))
+
+
+@dataclass(frozen=True, kw_only=True)
+class OrdinaryDriver:
+    """Parameters of SUMO's models of following, lane changing and junctions."""
+
+    speed_factor: float
+    """Desired speed, as a share of the limit."""
+    time_gap_s: float
+    """SUMO's `tau`."""
+    assertive: float
+    """SUMO's `lcAssertive`: the gaps that a lane change requires are divided by it."""
+    impatience: float
+    """SUMO's `impatience`: the willingness to make road users with priority brake."""
+
+
+SPEED_FACTORS = (0.8, 1.2)
+"""Two standard deviations of SUMO's default distribution, normc(1, 0.1)."""
+ASSERTIVE = (1.0, 2.0)
+"""From SUMO's default to half of the required gaps. Chosen here."""
+IMPATIENCE = (0.0, 1.0)
+"""All that SUMO has."""
+RANGES = (SPEED_FACTORS, TIME_GAPS_S, ASSERTIVE, IMPATIENCE)
+
+
+def ordinary_driver_at(shares: FloatArray) -> OrdinaryDriver:
+    """The driver at a point [len(RANGES)] of the unit cube, whose edges are the `RANGES`."""
+    speed_factor, time_gap_s, assertive, impatience = map(between, RANGES, shares.tolist())
+    return OrdinaryDriver(speed_factor=speed_factor, time_gap_s=time_gap_s, assertive=assertive, impatience=impatience)

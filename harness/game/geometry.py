@@ -214,7 +214,6 @@ def _own(own: Box, n: int, p: int) -> Box:
 
 @compiled
 def other_box(others: Box, n: int, b: int) -> Box:
-    """One of the boxes [N, B]."""
     return Box(
         others.x_m[n, b], others.y_m[n, b], others.heading_rad[n, b], others.length_m[n, b], others.width_m[n, b]
     )

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray
-from harness.game.follower import Follower, draw_follower
+from harness.game.follower import Follower, OrdinaryDriver, draw_follower
 from harness.game.human_factors import (
     NO_LIMITS,
     ActuatorShares,
@@ -27,7 +27,6 @@ from harness.game.human_factors import (
     draw_lapses,
     glances_over_shoulder,
 )
-from harness.game.ordinary_driver import OrdinaryDriver
 from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles
 from harness.game.road import Routes
 from harness.game.roles import EGO

@@ -48,5 +48,4 @@ class World:
 
     @cached_property
     def steps(self) -> int:
-        """Steps until the time limit."""
         return round(self.time_limit_s / self.step_s)

@@ -77,7 +77,6 @@ class GamePlan:
 
     @property
     def edges(self) -> set[str]:
-        """The edges of the players' routes."""
         return {name for route in (self.ego_route, self.person_route) if route is not None for name in route.edges}
 
     @property

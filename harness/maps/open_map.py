@@ -64,11 +64,9 @@ class OpenMap:
         return f"{streets} ({candidate.place[0]:.0f}, {candidate.place[1]:.0f})"
 
     def roads(self) -> list[FloatArray]:
-        """The lines [n, 2] of the lanes for cars."""
         return [lane_line(lane) for edge in self.net.getEdges(withInternal=False) for lane in car_lanes(edge)]
 
     def listed(self) -> tuple[list[ListedLane], list[ListedJunction]]:
-        """Lanes and junctions, for a drawing."""
         edges = self.net.getEdges(withInternal=False)
         return [listed_lane(lane) for edge in edges for lane in edge.getLanes()], listed_junctions(edges)
 

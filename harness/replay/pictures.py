@@ -56,7 +56,6 @@ def labels_at(frame: pd.DataFrame, names: Mapping[str, str], centre_m: FloatArra
 
 
 def captioned(picture: Image.Image, caption: str, labels: Sequence[Label]) -> Image.Image:
-    """The picture with a caption in its corner and the labels."""
     draw = ImageDraw.Draw(picture)
     draw.text((12, 10), caption, fill=_INK, font=_font(_CAPTION_PX))
     middle = 0.5 * picture.width, 0.5 * picture.height

@@ -43,8 +43,6 @@ _DOT_PT, _FAILED_ALPHA, _WELL_ALPHA = 2.4, 0.95, 0.45
 
 @dataclass(frozen=True, kw_only=True)
 class ArmColumn:
-    """An arm as a column of figures."""
-
     label: str
     series: str
     """A key of `SERIES`."""

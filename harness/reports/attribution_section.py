@@ -9,8 +9,8 @@ from typing import Any
 import pandas as pd
 
 from harness.config.traits import TRAITS
+from harness.evaluation.competence import ALL_TRAITS
 from harness.evaluation.strategies import NaiveEgo, against_persona
-from harness.evaluation.trait_question import ALL_TRAITS
 from harness.reports.embedding import key
 from harness.reports.game_links import GameLinks
 from harness.reports.numbers import MISSING, NO_SPACE, p_number, signed

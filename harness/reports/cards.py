@@ -25,8 +25,7 @@ from harness.reports.human_ranges import crashes_alone
 from harness.reports.key_figures import card_verdict, egos_of, key_figures, portrait
 from harness.reports.numbers import number, percent, sure
 from harness.reports.run_tables import QUESTIONS, Row, RunTables, failures, failures_of, played
-from harness.reports.scope_wording import over_trainings_statistics
-from harness.reports.verdict_wording import answer
+from harness.reports.verdict_wording import answer, over_trainings_statistics
 
 LONGEST_LABEL = 12
 """Letters of a persona's name that fit under a column of a figure."""
@@ -54,7 +53,7 @@ def card(
     tests = [row for row in tables.comparisons.to_dict("records") if row["persona"] == persona]
     labels = {columns[0].arm: f"{tables.naive}, alone", columns[2].arm: f"{tables.naive}, against {persona}"}
     labels |= {each.arm: f"{tables.change.made} ego, against {persona}" for each in columns[3:]}
-    failed = {arm: sum(map(failures, tables.rates_of(arm).values())) for arm in labels}
+    failed = {arm: tables.counts_of(arm)[0] for arm in labels}
     of_egos = [path for path in paths if path.persona == persona]
     paired, paired_note = _paired(persona, place, columns[2], columns[3], tables) if is_changed else (None, "")
     return {

@@ -7,8 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, get_args
 
-from harness.evaluation.comparisons.run_comparison import Difference, Side
-from harness.evaluation.comparisons.run_history import ChangedGame, GameChange
+from harness.evaluation.comparisons.run_comparison import ChangedGame, Difference, GameChange, Side
 from harness.reports.differences import CHANCE, NO_RELEVANT_DIFFERENCE, RELEVANT_SPEED_MPS
 from harness.reports.embedding import key
 from harness.reports.figures import GAME

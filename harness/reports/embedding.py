@@ -23,8 +23,6 @@ from harness.reports.page_template import json_text
 
 
 class PackedColumn(NamedTuple):
-    """How a column of a track is packed."""
-
     unit: float
     """Values are rounded to multiples of it."""
     differences: int

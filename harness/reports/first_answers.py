@@ -16,7 +16,7 @@ from harness.reports.focus import Focus, focus_of
 from harness.reports.key_figures import egos_of
 from harness.reports.next_steps import NextStep
 from harness.reports.numbers import NO_SPACE, number
-from harness.reports.run_tables import RunTables, failures, played
+from harness.reports.run_tables import RunTables
 from harness.reports.severity_wording import severity_clause
 from harness.reports.verdict_wording import answer
 
@@ -74,7 +74,7 @@ def _why(focus: Focus | None, tables: RunTables) -> Iterator[str]:
     if focus.persona:
         arms |= {arm: made for _, made, arm in egos_of(focus.persona, tables)}
     for arm, ego in arms.items():
-        failed, games = _count(arm, tables)
+        failed, games = tables.counts_of(arm)
         against = f" against {focus.persona}" if focus.persona else ""
         where = against if arm != NAIVE_VS_SUMO.name else " against an ordinary driver"
         if failed:
@@ -85,7 +85,7 @@ def _why(focus: Focus | None, tables: RunTables) -> Iterator[str]:
         elif arm == focus.arm:
             yield f"The {ego} does not fail{where}: the broken bound is of another kind."
     if baseline := tables.manifest.get("baseline"):
-        failed, games = _count(against_persona(NaiveEgo(), baseline).name, tables)
+        failed, games = tables.counts_of(against_persona(NaiveEgo(), baseline).name)
         if failed:
             yield f"The {tables.naive} also fails against the baseline, {baseline}, in {failed} of {games} games."
 
@@ -94,7 +94,7 @@ def _prevented(persona: str, tables: RunTables) -> Iterator[str]:
     """What the driver of the regulation prevents against a persona, for each ego that fails."""
     clauses, not_judged = [], []
     for _, made, arm in egos_of(persona, tables):
-        failed, _ = _count(arm, tables)
+        failed, _ = tables.counts_of(arm)
         judged = tables.prevented_in(arm)
         conflict, start = (sum(row[f"from_{when}_prevented"] for row in judged) for when in ("conflict", "start"))
         if failed and judged:
@@ -127,7 +127,7 @@ def _retrained(persona: str, tables: RunTables) -> Iterator[str]:
     if not tables.asked("RQ2", persona):
         return
     naive, changed = tables.arms_of("RQ2", persona)
-    before, after = _count(naive, tables), _count(changed, tables)
+    before, after = tables.counts_of(naive), tables.counts_of(changed)
     given = answer(tables, "RQ2", persona)
     text = f"Against {persona}: {given.label}. {before[0]} of {before[1]} failures become {after[0]} of {after[1]}"
     faster = _speed_mps(changed, tables) - _speed_mps(naive, tables)
@@ -139,8 +139,3 @@ def _retrained(persona: str, tables: RunTables) -> Iterator[str]:
 def _speed_mps(arm: str, tables: RunTables) -> float:
     speeds = [row["mean_speed_mps"] for row in tables.rates_of(arm).values()]
     return float(np.mean(speeds)) if speeds else np.nan
-
-
-def _count(arm: str, tables: RunTables) -> tuple[int, int]:
-    rows = tables.rates_of(arm).values()
-    return sum(map(failures, rows)), sum(map(played, rows))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from harness.evaluation.comparisons.acceptance_checks import Check, worst_of_each
 from harness.evaluation.strategies import NAIVE_ALONE, NAIVE_VS_SUMO, against_persona
 from harness.reports.acceptance_wording import TITLES
-from harness.reports.run_tables import RunTables, failures
+from harness.reports.run_tables import RunTables
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,12 +37,12 @@ def focus_of(tables: RunTables) -> Focus | None:
 
 def _candidates(tables: RunTables) -> Iterator[Focus]:
     for arm, where in ((NAIVE_ALONE.name, "fails alone"), (NAIVE_VS_SUMO.name, "fails against an ordinary driver")):
-        if failed := _failed(arm, tables):
+        if failed := tables.counts_of(arm)[0]:
             yield Focus(arm=arm, ego=tables.naive, persona="", happens=f"the {tables.naive} {where}", failed=failed)
     for check in worst_of_each(tables.acceptance or ()):
         if check.measured and not check.passed and len(tables.games_of(check.arm)):
             happens = f"the ego breaks the bound on {TITLES[check.bound]} against {check.persona}"
-            failed = _failed(check.arm, tables)
+            failed, _ = tables.counts_of(check.arm)
             yield Focus(arm=check.arm, ego="ego", persona=check.persona, happens=happens, failed=failed, check=check)
     changed = f"{tables.change.made} ego"
     last = [(against_persona(tables.last_ego(each), each).name, each) for each in tables.personas]
@@ -51,11 +51,9 @@ def _candidates(tables: RunTables) -> Iterator[Focus]:
         (last, changed, "the {ego} still fails against {persona}"),
         (naive, tables.naive, "{persona} makes the {ego} fail"),
     ):
-        failed, arm, persona = max(((_failed(arm, tables), arm, persona) for arm, persona in arms), default=(0, "", ""))
+        failed, arm, persona = max(
+            ((tables.counts_of(arm)[0], arm, persona) for arm, persona in arms), default=(0, "", "")
+        )
         if failed:
             words = happens.format(ego=ego, persona=persona)
             yield Focus(arm=arm, ego=ego, persona=persona, happens=words, failed=failed)
-
-
-def _failed(arm: str, tables: RunTables) -> int:
-    return sum(map(failures, tables.rates_of(arm).values()))

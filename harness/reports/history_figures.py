@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from markupsafe import Markup
 
-from harness.evaluation.comparisons.run_history import FailureRate
+from harness.evaluation.comparisons.run_comparison import FailureRate
 from harness.evaluation.strategies import (
     Arm,
     NaiveEgo,

@@ -43,8 +43,6 @@ class WorstCell:
 
 @dataclass(frozen=True, kw_only=True)
 class IndexedRun:
-    """One run of an index."""
-
     folder: Path
     name: str
     state: State
@@ -135,7 +133,6 @@ def terminal_table(runs: Sequence[IndexedRun]) -> Table:
 
 
 def record_of(run: IndexedRun) -> dict[str, Any]:
-    """A run of the index as JSON has it."""
     return asdict(run) | {"folder": str(run.folder)}
 
 

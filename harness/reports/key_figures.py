@@ -10,9 +10,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from harness.evaluation.comparisons.arm_clauses import Beside, by_criterion, harm_clauses, near_misses
 from harness.evaluation.comparisons.comparison import HARM, SHARES
-from harness.evaluation.comparisons.harm_clauses import Beside, harm_clauses
-from harness.evaluation.comparisons.near_misses import by_criterion, near_misses
 from harness.evaluation.competence import Verdict
 from harness.evaluation.strategies import Arm, EgoStrategy, PersonaNonEgo
 from harness.game.human_factors import Attention

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from harness.evaluation.league_columns import NOBODY, SUMO_DRIVER
+from harness.evaluation.result_columns import NOBODY, SUMO_DRIVER
 from harness.reports.failure_table import ORDINARY, FailureCell
 from harness.reports.numbers import NO_SPACE, interval, number, percent
 from harness.reports.page_template import environment_of
@@ -52,21 +52,20 @@ def render_league(ego: str, table: pd.DataFrame, addresses: Sequence[str], faile
     )
 
 
-def league_terminal(table: pd.DataFrame, most: int = 12) -> Table:
-    """The worst rows for the terminal."""
+def league_terminal(table: pd.DataFrame) -> Table:
+    """The twelve worst rows for the terminal."""
     from rich.table import Table
 
     shown = Table(box=None, pad_edge=False)
     for heading in HEADINGS[:5]:
         shown.add_column(heading, overflow="fold")
-    for row in table.head(most).to_dict("records"):
+    for row in table.head(12).to_dict("records"):
         style = "dim" if row["reason"] else "red" if row["failure_rate"] > _MUCH else None
         shown.add_row(*list(_texts(row))[:5], style=style)
     return shown
 
 
 def ranks_terminal(ranks: pd.DataFrame) -> Table:
-    """The table `league_ranks` for the terminal."""
     from rich.table import Table
 
     shown = Table(box=None, pad_edge=False)

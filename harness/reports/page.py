@@ -26,8 +26,8 @@ from harness.reports.page_header import header, troubles
 from harness.reports.page_template import CONTENT_POLICY, ELSEWHERE, LIBRARIES, SCRIPTS, environment_of, sources
 from harness.reports.provenance import asked_alone
 from harness.reports.run_tables import RunTables
-from harness.reports.scope_wording import planned_in_words
 from harness.reports.start_section import start_section
+from harness.reports.verdict_wording import planned_in_words
 
 MOST_ROWS = 10_000
 """The page leaves out a longer table of games and refers to its CSV file."""

@@ -175,13 +175,17 @@ class RunTables:
 
     @cached_property
     def rates(self) -> Mapping[tuple[str, int], Row]:
-        """The rows of `summary` by arm and seed."""
         return {(row["arm"], row["seed"]): row for row in self.summary.to_dict("records")}
 
     def rates_of(self, arm: str) -> dict[int, Row]:
         """The arm's rows of `summary` by seed, where there are games that could be played."""
         rows = {seed: self.rates.get((arm, seed)) for seed in self.seeds}
         return {seed: row for seed, row in rows.items() if row is not None and played(row)}
+
+    def counts_of(self, arm: str) -> tuple[int, int]:
+        """How many games of an arm the ego failed, and how many could be played, over all training seeds."""
+        rows = self.rates_of(arm).values()
+        return sum(map(failures, rows)), sum(map(played, rows))
 
     def games_of(self, arm: str) -> pd.DataFrame:
         """The arm's games that could be played."""

@@ -52,7 +52,6 @@ class BackgroundPeople:
         self.inserted[name] = game
 
     def clear(self, game: int) -> None:
-        """Remove all persons of a game."""
         for name in [name for name, of_game in self.inserted.items() if of_game == game]:
             libsumo.person.remove(name)
             self._forget(name)

@@ -68,8 +68,6 @@ class _Table:
 
 
 class BackgroundTraffic:
-    """The background traffic of all games."""
-
     def __init__(
         self, tiles: Tiles, insertion: Insertion, *, step_s: float, fastest_player_mps: float, recorded: bool
     ) -> None:

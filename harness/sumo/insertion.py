@@ -14,9 +14,9 @@ import libsumo
 import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray
+from harness.game.follower import OrdinaryDriver
 from harness.game.geometry import Box, box_distance, boxes_of
 from harness.game.initial_state import InitialState
-from harness.game.ordinary_driver import OrdinaryDriver
 from harness.game.roles import EGO
 from harness.road.demand.route_file import SHARE, Departure, Motion
 from harness.road.demand.stops import Stop

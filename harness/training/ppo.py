@@ -39,8 +39,6 @@ _ALGORITHMS: dict[str, type[PPO]] = {"compiled": CompiledPPO, "stable_baselines3
 
 @dataclass(frozen=True, kw_only=True)
 class TrainingResult:
-    """The result of a training."""
-
     policy: Policy
     progress: Progress
     stopped: str

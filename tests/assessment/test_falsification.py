@@ -10,7 +10,7 @@ import pytest
 from harness.assessment.falsification import NOT_CLOSE_S, Searcher, falsify, loss_of, points
 from harness.drivers.sumo import SumoDriver
 from harness.game.arrays import FloatArray
-from harness.game.ordinary_driver import RANGES, SPEED_FACTORS, ordinary_driver_at
+from harness.game.follower import RANGES, SPEED_FACTORS, ordinary_driver_at
 from harness.road.scene.open_scene import OpenScene
 from tests.support.rollouts import Steady, arm, trace
 

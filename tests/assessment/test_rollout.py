@@ -105,7 +105,6 @@ def test_assess__lapses_depend_on_the_episode_and_not_on_the_arm(merge: OpenScen
 
 
 def side_by_side(assessed: SeatedArm, *batches: list[int]) -> list[str]:
-    """The games as text, each with all of its trace."""
     return [repr((game.played, game.trace)) for game in assess_batches(assessed, batches)]
 
 

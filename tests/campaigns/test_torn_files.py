@@ -84,19 +84,6 @@ def test_every_file__torn_in_any_way_is_noticed_where_it_counts(copy: Path) -> N
     folder.check_whole(manifest)
 
 
-@pytest.mark.parametrize("way", WAYS)
-def test_manifest__torn_is_one_message(way: str, copy: Path) -> None:
-    content = (copy / "manifest.json").read_bytes()
-    tear(copy / "manifest.json", way)
-    try:
-        for action in (lambda: RunFolder(copy).manifest(), lambda: RunFolder(copy).claim("learned")):
-            with pytest.raises(UsageError) as error:
-                action()
-            assert len(error.value.problems) == 1
-    finally:
-        (copy / "manifest.json").write_bytes(content)
-
-
 def test_report__of_a_torn_run_is_refused_and_nothing_is_written(tmp_path: Path) -> None:
     run = shutil.copytree(learned_run(), tmp_path / "run")
     table = run / ".stages" / "naive_alone-seed1" / "played.csv"

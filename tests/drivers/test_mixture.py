@@ -11,7 +11,7 @@ import pytest
 
 from harness.assessment.rollout import assess
 from harness.assessment.seated_arm import SeatedArm
-from harness.campaign.results.population_rows import by_who_drove
+from harness.campaign.results.run_people import by_who_drove
 from harness.config.campaign import Campaign, Population
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document

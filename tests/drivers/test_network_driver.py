@@ -24,8 +24,8 @@ from harness.drivers.sb3_policy import Sb3Driver
 from harness.errors import DriverError, UsageError
 from harness.game.observation_layout import LAYOUT, SIZE
 from tests.support.external_drivers import document, find
+from tests.support.observations import Recorded
 from tests.support.policies import some_policy
-from tests.support.random_observations import Recorded
 
 torch.set_num_threads(1)
 GAMES = np.arange(5)

@@ -24,7 +24,7 @@ from harness.drivers.sb3_policy import Sb3Driver
 from harness.errors import UsageError
 from harness.game.observation_layout import SIZE
 from harness.road.scene.open_scene import OpenScene
-from tests.support.random_observations import Recorded
+from tests.support.observations import Recorded
 from tests.support.rollouts import arm, play
 
 torch.set_num_threads(1)  # tiny networks: more threads only wait for each other

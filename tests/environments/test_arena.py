@@ -56,7 +56,6 @@ def payoff(repository: Any) -> Payoff:
 
 @pytest.fixture
 def arena_of(arena_of: Open, payoff: Payoff) -> Open:
-    """Arenas whose players have a payoff."""
     return partial(arena_of, payoff=payoff)
 
 

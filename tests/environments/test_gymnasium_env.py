@@ -286,17 +286,12 @@ def test_parallel__each_agent_has_the_payoff_of_its_persona(opened: Open) -> Non
 # --- Stable-Baselines3 ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", ["arena", "gymnasium"])
-def test_sb3__trains_with_an_eval_callback_in_the_same_process(opened: Open, kind: str) -> None:
+def test_sb3__trains_with_an_eval_callback_in_the_same_process(opened: Open) -> None:
     from stable_baselines3 import PPO
     from stable_baselines3.common.callbacks import EvalCallback
     from stable_baselines3.common.monitor import Monitor
-    from stable_baselines3.common.vec_env import DummyVecEnv
 
-    if kind == "arena":
-        training = opened(make_vec, 4, other="sumo", interface="sb3")
-    else:
-        training = opened(DummyVecEnv, [lambda: Monitor(DrivingEnv())])
+    training = opened(make_vec, 4, other="sumo", interface="sb3")
     evaluation = opened(Monitor, DrivingEnv(other="sumo"))
     assert isinstance(evaluation.unwrapped._game.arena.simulation, SubprocessSimulation)
     callback = EvalCallback(evaluation, n_eval_episodes=2, eval_freq=256 // training.num_envs, verbose=0, warn=False)

@@ -38,7 +38,6 @@ FAR = ego(20.0, y_m=-4.8)
 
 
 def meeting(q: Quantities, body: int = 2, player: int = 0) -> Meetings:
-    """What one player meets in one body."""
     return Meetings(*(column[0, player, body] for column in q.meetings))
 
 

@@ -17,7 +17,7 @@ from tests.hostile.inputs import CARD, CHECK, TENSORS, write_project, write_run
 from tests.support.chromium import launched, opener
 from tests.support.pages import campaign, rendered
 from tests.support.recorded import SCENE, manoeuvres, recorded
-from tests.support.sources import SOURCES, label, tree_of
+from tests.support.repository import SOURCES, label, tree_of
 from tests.support.tiny import harness
 
 # --- the source -------------------------------------------------------------------------------------------------------

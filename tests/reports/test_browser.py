@@ -6,8 +6,7 @@ import pytest
 
 from tests.support.chromium import COLOURS, contrast, unfold
 from tests.support.game_tables import findings
-from tests.support.incompetent import cannot_drive
-from tests.support.pages import campaign, with_errors
+from tests.support.pages import campaign, cannot_drive, with_errors
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,7 @@ import re
 import pytest
 from rich.console import Console
 
-from harness.evaluation.comparisons.run_comparison import differences_of
-from harness.evaluation.comparisons.run_history import changed_games, failure_rates
+from harness.evaluation.comparisons.run_comparison import changed_games, differences_of, failure_rates
 from harness.reports.comparison_page import (
     ComparedRun,
     Comparison,

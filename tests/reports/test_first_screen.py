@@ -30,7 +30,6 @@ def table_in(run):
 
 
 def texts(run):
-    """The cells as text, by person."""
     return {
         line.person: [cell and f"{cell.rate}, {cell.counts}".replace(NO_SPACE, " ") for cell in line.cells]
         for line in table_in(run)["lines"]

@@ -18,10 +18,17 @@ from harness.reports.differences import CHANCE, NO_T_STATISTIC, effect, p_values
 from harness.reports.numbers import duration, number, p_number, p_text, percent, signed
 from harness.reports.page import REPLAYS_SHOWN
 from harness.reports.run_tables import RunTables
-from harness.reports.scope_wording import planned_in_words
-from harness.reports.verdict_wording import NO_ROUND_2, answer
-from tests.support.incompetent import cannot_drive
-from tests.support.pages import Page, blank_figures, campaign, recomputed, recordings, rendered, with_errors
+from harness.reports.verdict_wording import NO_ROUND_2, answer, planned_in_words
+from tests.support.pages import (
+    Page,
+    blank_figures,
+    campaign,
+    cannot_drive,
+    recomputed,
+    recordings,
+    rendered,
+    with_errors,
+)
 
 
 @pytest.fixture(scope="module")

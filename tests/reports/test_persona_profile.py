@@ -45,7 +45,6 @@ def profile_of(file: Path) -> PersonaProfile:
 
 
 def invented(**changes: Any) -> PersonaProfile:
-    """The profile of an invented persona."""
     document = {
         "name": "anna",
         "description": "<script>alert('anna')</script> [red]drives[/red]",

@@ -32,7 +32,6 @@ VAN = '[[obstacle]]\nkind = "van"\nlane = "road_0"\nposition_m = 150.0\n'
 
 
 def add(scene: OpenScene, *obstacles: str) -> OpenScene:
-    """The scene with obstacles added to its document."""
     file = scene.folder / "scene.toml"
     file.write_text("\n".join([file.read_text(encoding="utf-8"), *obstacles]), encoding="utf-8")
     return open_scene(scene.folder)

@@ -19,7 +19,7 @@ from harness.evaluation.columns import TABLES
 from harness.evaluation.comparisons.comparison import compare
 from harness.evaluation.comparisons.over_trainings import compare_over_trainings
 from harness.evaluation.comparisons.summary import summarise
-from harness.evaluation.competence import ResearchQuestion
+from harness.evaluation.competence import DID_NOT_LEARN, ResearchQuestion
 from harness.evaluation.strategies import (
     NAIVE_ALONE,
     NAIVE_VS_SUMO,
@@ -272,3 +272,14 @@ def recomputed(arguments: dict[str, Any], competence: Mapping[str, float] = UNGA
     """The campaign with tables that fit its changed episodes; `competence` is its table of that name."""
     episodes, asked = arguments["episodes"], set(arguments["comparisons"]["question"])
     return arguments | {"summary": summarise(episodes)} | _compared(arguments["manifest"], episodes, asked, competence)
+
+
+def cannot_drive(arguments: dict[str, Any], seeds: Sequence[int] = (1,)) -> dict[str, Any]:
+    """The campaign with a speedy driver that never reaches its goal alone, in these seeds."""
+    episodes = arguments["episodes"]
+    alone = (episodes["arm"] == "speedy_alone") & episodes["seed"].isin(seeds)
+    episodes.loc[alone, "non_ego_outcome"] = "rail"
+    for seed in seeds:
+        entry = arguments["manifest"]["stages"][f"speedy-seed{seed}"]
+        entry |= {"stopped": DID_NOT_LEARN, "goals": 0, "played": GAMES, "goal_share_asked": 0.8}
+    return recomputed(arguments, competence={})

@@ -35,7 +35,6 @@ class Steady:
 
 
 def seated(drivers: Sequence[Driver | None], personas: Sequence[Persona]) -> tuple[Mixture | None, ...]:
-    """Drivers, each with its persona."""
     return tuple(
         None if each is None else mixture_of(each, persona) for each, persona in zip(drivers, personas, strict=True)
     )

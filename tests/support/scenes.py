@@ -12,7 +12,7 @@ from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.road.scene.open_scene import OpenScene, open_scene
 from harness.road.xml.sumo_program import run_program
-from tests.support.stations import nearest_station_m
+from tests.support.roads import nearest_station_m
 from tests.support.tiny import PATIENCE_S
 
 STRAIGHT_NODES = '<node id="a" x="0" y="0"/><node id="b" x="300" y="0"/>'

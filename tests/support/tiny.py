@@ -146,7 +146,6 @@ def end(process: subprocess.Popen[str]) -> str:
 
 
 def workers_of(parent: int) -> list[int]:
-    """The workers that a command has started."""
     return [pid for pid in children_of(parent) if b"worker_pool" in command_of(pid)]
 
 

@@ -11,7 +11,7 @@ import pandas as pd
 
 from harness.evaluation.recorded_game import BodyKind, RecordedGame
 from harness.game.world import World
-from tests.support.stations import nearest_station_m
+from tests.support.roads import nearest_station_m
 
 Pose = tuple[float, float, float, float]
 """x and y (m), heading (rad), speed (m/s)."""

@@ -64,7 +64,7 @@ class RunPlayers:
         opened = open_scene(folder.scene, driver.vehicle_type if driver is not None else None)
         self.scene: OpenScene = replace(opened, perception_errors=document.ego.perception_errors)
         self._stages = planned(manifest)
-        self._context = RunContext(
+        context = RunContext(
             folder=folder,
             document=document,
             ego_persona=Persona.from_record(manifest["ego_persona"]),
@@ -72,11 +72,12 @@ class RunPlayers:
             ego_driver=driver,
             policies=policies or policies_of_run(folder.path, document.policies, manifest["hashes"]),
         )
+        self._players = PlayerFactory(context=context, scene=self.scene)
 
     @property
     def start_seed(self) -> int:
         """The seed of the starts of its games."""
-        return self._context.document.start_seed
+        return self.document.start_seed
 
     def arms(self) -> list[AssessmentStage]:
         """The arms in which an ego meets people, with a driver each that this run can make again: none that other arms
@@ -99,11 +100,11 @@ class RunPlayers:
         """The players of an arm. Raises UsageError if one can't be made."""
         self.ego(stage)
         self.people(stage, episode=0)
-        return PlayerFactory(context=self._context, scene=self.scene).arm(stage)
+        return self._players.arm(stage)
 
     def ego(self, stage: AssessmentStage) -> SeatedDriver:
         """The ego of an arm. Raises UsageError if it can't be made."""
-        persona, planned = self._context.ego_persona, self._member(stage, EGO, episode=0)
+        persona, planned = self._players.context.ego_persona, self._member(stage, EGO, episode=0)
         if isinstance(planned, External | Reconfigured):
             if self._ego is None or isinstance(planned, Reconfigured) or planned.name:
                 raise UsageError.of(
@@ -116,18 +117,16 @@ class RunPlayers:
     def people(self, stage: AssessmentStage, episode: int) -> tuple[SeatedDriver, ...]:
         """Each person of an arm in one episode. Raises UsageError if a policy can't be read."""
         members = (self._member(stage, player, episode) for player in range(1, len(self.scene.world.roles)))
-        players = PlayerFactory(context=self._context, scene=self.scene)
-        return tuple(self._seated(each, players.persona(each)) for each in members)
+        return tuple(self._seated(each, self._players.persona(each)) for each in members)
 
     def _seated(self, planned: PlannedMember, persona: Persona) -> SeatedDriver:
-        players = PlayerFactory(context=self._context, scene=self.scene)
-        policy = None
-        if isinstance(planned, TrainedBefore) and self._context.policies is None:
-            message = f"{planned.stage!r} was read from {self._context.document.policies!r}"
+        policy, context = None, self._players.context
+        if isinstance(planned, TrainedBefore) and context.policies is None:
+            message = f"{planned.stage!r} was read from {self.document.policies!r}"
             raise UsageError.of(self._folder.path, planned.stage, message, "it is not found: name it with --policies")
         if isinstance(planned, Trained | TrainedBefore):
-            policy = players.policy_folder(planned)
-        return SeatedDriver(driver=players.driver(planned), persona=persona, policy=policy)
+            policy = self._players.policy_folder(planned)
+        return SeatedDriver(driver=self._players.driver(planned), persona=persona, policy=policy)
 
     def _member(self, stage: AssessmentStage, player: int, episode: int) -> PlannedMember:
         """Who of a mixture drives as a player in an episode; the driver itself where there is one."""

@@ -88,7 +88,6 @@ class RunContext:
 def run_context_of(
     campaign: OpenCampaign, folder: RunFolder, keys: Mapping[str, str], keep_going: bool = False
 ) -> RunContext:
-    """The context of a run of a campaign."""
     return RunContext(
         folder=folder,
         document=campaign.document,

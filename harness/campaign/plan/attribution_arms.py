@@ -18,8 +18,8 @@ from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.plan.strategy_stages import SeedStages
 from harness.config.campaign import Campaign
 from harness.config.traits import PersonTraits
+from harness.evaluation.competence import ALL_TRAITS, TraitQuestion
 from harness.evaluation.strategies import Arm, Borrowed, NaiveEgo, PersonaNonEgo, against_persona, persona_alone
-from harness.evaluation.trait_question import ALL_TRAITS, TraitQuestion
 
 
 def plan_attribution(of: SeedStages) -> list[AssessmentStage]:

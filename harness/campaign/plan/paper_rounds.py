@@ -17,13 +17,14 @@ with a folder of policies has the same arms and no trainings.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from harness.campaign.plan.alone_bounds import alone_bounds
 from harness.campaign.plan.stages import AssessmentStage, SearchStage, Stage, TrainingStage
 from harness.campaign.plan.strategy_stages import SeedStages, ego_learns
 from harness.config.campaign import Campaign
 from harness.evaluation.competence import Question, ResearchQuestion
+from harness.evaluation.planned_tests import Family, families
 from harness.evaluation.strategies import (
     ATTENTIVE,
     NAIVE_ALONE,
@@ -116,3 +117,32 @@ def questions(campaign: Campaign, personas: Sequence[str], tunable: bool = False
             for question, baseline, treatment in pairs
         ]
     return asked
+
+
+def planned_families(campaign: Campaign, personas: Sequence[str], tunable: bool = False) -> tuple[Family, ...]:
+    """The families of Holm's correction, before any outcome is known; `tunable` as in `plan`."""
+    return families(questions(campaign, personas, tunable))
+
+
+def family_lines(families: Sequence[Family]) -> Iterator[str]:
+    """A line for each family of Holm's correction: its tests, and their training seeds."""
+    for family in families:
+        tests = ", ".join(dict.fromkeys(f"{test.question} {test.persona}" for test in family.tests))
+        seeds = list(dict.fromkeys(str(seed) for test in family.tests for seed in test.seeds))
+        each = "each by itself" if len(family.tests[0].seeds) == 1 else "together"
+        trainings = f"training seeds {', '.join(seeds)} {each}" if len(seeds) > 1 else f"training seed {seeds[0]}"
+        size = f"{len(family.tests)} test{'' if len(family.tests) == 1 else 's'}"
+        yield f"Holm's correction over {size} about {family.about.value}: {tests} ({trainings})"
+
+
+def family_records(families: Sequence[Family]) -> list[dict[str, object]]:
+    """A record for each family, as `family_lines` tells it."""
+    return [
+        {
+            "about": family.about.value,
+            "tests": [
+                {"question": test.question, "persona": test.persona, "seeds": list(test.seeds)} for test in family.tests
+            ],
+        }
+        for family in families
+    ]

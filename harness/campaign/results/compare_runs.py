@@ -13,8 +13,7 @@ from harness.campaign.results.read_run import episodes_of
 from harness.campaign.storage.manifest import planned
 from harness.campaign.storage.run_folder import RunFolder
 from harness.errors import UsageError
-from harness.evaluation.comparisons.run_comparison import differences_of
-from harness.evaluation.comparisons.run_history import changed_games, failure_rates
+from harness.evaluation.comparisons.run_comparison import changed_games, differences_of, failure_rates
 from harness.reports.comparison_page import ComparedRun, Comparison, Transition, compared_rows
 from harness.reports.history_figures import histories
 

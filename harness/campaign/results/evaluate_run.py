@@ -11,10 +11,8 @@ import pandas as pd
 from harness.campaign.plan.stages import AssessmentStage, TrainingStage, stage_id
 from harness.campaign.results.drawn_starts import drawn_starts
 from harness.campaign.results.matchups import matchups_of
-from harness.campaign.results.population_rows import by_who_drove
 from harness.campaign.results.read_run import ReadRun
-from harness.campaign.results.realism_gate import declared_of, is_played, questions_of
-from harness.campaign.results.run_traits import failures_by_trait
+from harness.campaign.results.run_people import by_who_drove, declared_of, failures_by_trait, is_played, questions_of
 from harness.campaign.storage.learned import judged
 from harness.campaign.storage.manifest import is_tuned
 from harness.evaluation.comparisons.acceptance_checks import Evidence, judge

@@ -26,7 +26,7 @@ from harness.errors import FAILED
 from harness.evaluation.comparisons.comparison import rate_cells
 from harness.evaluation.comparisons.preventability import by_regulation
 from harness.evaluation.competence import goals_alone
-from harness.evaluation.league_columns import NOBODY, SUMO_DRIVER
+from harness.evaluation.result_columns import NOBODY, SUMO_DRIVER
 from harness.evaluation.strategies import NAIVE_ALONE, NAIVE_VS_SUMO
 from harness.evaluation.tables import read_csv, table_of, write_csv
 from harness.evaluation.worst_first import worst_first
@@ -90,7 +90,6 @@ def write_league(ego: str, folder: Path, results: Mapping[str, RunResult]) -> Le
 
 
 def person_of(arm: str, persona: str) -> str:
-    """The cell `person` of an arm."""
     return _PLACED.get(arm, persona)
 
 

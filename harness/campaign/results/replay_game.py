@@ -63,7 +63,6 @@ def _listed(run: Path, chosen: GameList) -> tuple[pd.DataFrame, int, int]:
 
 
 def game_table(run: Path, chosen: GameList) -> Table:
-    """The chosen games of a run, for the terminal."""
     games, number, pages = _listed(run, chosen)
     players = ("ego", *people_in(games.columns))
     left = f"page {chosen.page} of {pages}, {number:,} games; {_OTHERS}; " if pages > 1 else ""

@@ -34,7 +34,6 @@ def runs_in(folder: Path) -> list[IndexedRun]:
 
 
 def indexed_run(path: Path) -> IndexedRun:
-    """A run as the index has it."""
     try:
         return _read(RunFolder(path))
     except (HarnessError, OSError, ValueError, KeyError) as error:

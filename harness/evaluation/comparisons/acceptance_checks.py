@@ -16,9 +16,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import pandas as pd
 
+from harness.evaluation.comparisons.arm_clauses import Beside, by_criterion, harm_clauses
 from harness.evaluation.comparisons.comparison import games_by_arm, mean_interval, pairs_of
-from harness.evaluation.comparisons.harm_clauses import Beside, harm_clauses
-from harness.evaluation.comparisons.near_misses import by_criterion
 from harness.evaluation.comparisons.preventability import by_regulation
 from harness.evaluation.gap_verdict import GapVerdict
 from harness.evaluation.strategies import (
@@ -84,7 +83,6 @@ class Evidence:
 
     @cached_property
     def rows(self) -> Mapping[tuple[str, int], Mapping[Any, Any]]:
-        """The rows of summary.csv by arm and seed."""
         return {(row["arm"], row["seed"]): row for row in self.summary.to_dict("records")}
 
     def unanswered(self, persona: str, seed: int) -> str:

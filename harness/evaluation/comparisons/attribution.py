@@ -14,9 +14,8 @@ import numpy as np
 import pandas as pd
 
 from harness.evaluation.comparisons.comparison import games_by_arm, holm, mcnemar, mean_cells, pairs_of
-from harness.evaluation.competence import gate
+from harness.evaluation.competence import TraitQuestion, gate
 from harness.evaluation.tables import table_of
-from harness.evaluation.trait_question import TraitQuestion
 from harness.evaluation.worst_first import worst_first
 from harness.game.arrays import FloatArray
 

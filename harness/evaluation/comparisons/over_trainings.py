@@ -100,7 +100,10 @@ def compare_over_trainings(questions: Sequence[Question], episodes: pd.DataFrame
     games = games_by_arm(episodes)
     table = table_of("over_trainings", [_row(test, games) | {"planned_tests": len(planned)} for test in planned])
     table["p_holm"] = holm(table["p_value"].to_numpy(dtype=np.float64), len(planned))
-    table["verdict"] = [row["verdict"] or _verdict(row, significance).value for row in table.to_dict("records")]
+    table["verdict"] = [
+        row["verdict"] or verdict_of(row["p_value"], row["p_holm"], row["mean_difference"], significance).value
+        for row in table.to_dict("records")
+    ]
     return typed(table)
 
 
@@ -132,7 +135,3 @@ def _row(test: PlannedTest, games: Mapping[Any, pd.DataFrame]) -> dict[str, Any]
     low, high = found.interval
     row |= {"ci_low": low, "ci_high": high, "t": found.t, "degrees": found.degrees, "p_value": found.p_value}
     return row | {"standard_error": found.standard_error}
-
-
-def _verdict(row: Mapping[Any, Any], significance: float) -> Verdict:
-    return verdict_of(row["p_value"], row["p_holm"], row["mean_difference"], significance)

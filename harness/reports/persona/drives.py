@@ -28,7 +28,6 @@ class SampleDrive:
 
     @property
     def lapsed_share(self) -> float:
-        """Share of the drive in lapses of attention."""
         return sum(end - begin for begin, end in self.lapses) / DRIVE_S
 
 
@@ -73,11 +72,11 @@ def free_share(attention: Attention, drive_s: float = DRIVE_S) -> float:
     return (1.0 - lapsed_share(attention)) * math.exp(-drive_s / attention.mean_attentive_s)
 
 
-def drift_m(steering_rad: float, lapse_s: float, speed_mps: float = DRIFT_SPEED_MPS) -> float:
+def drift_m(steering_rad: float, lapse_s: float) -> float:
     """Lateral displacement of an uncontrolled car in a lapse, on a straight road, wheel at an angle; m, positive: left.
 
     The kinematic bicycle of harness.game.bicycle at small angles: its slip angle is half the steering angle, and it
     turns by v tan(angle) / wheelbase per second, so v t tan(angle) / 2 + v² t² tan(angle) / (2 wheelbase).
     """
-    way, turn = speed_mps * lapse_s, math.tan(steering_rad)
+    way, turn = DRIFT_SPEED_MPS * lapse_s, math.tan(steering_rad)
     return way * turn / 2.0 + way**2 * turn / (2.0 * WHEELBASE_M)

@@ -151,8 +151,6 @@ class Mix:
 
 @dataclass(frozen=True, kw_only=True)
 class RouteFile:
-    """The content of a route file."""
-
     path: Path
     types: Mapping[str, VehicleType]
     vehicles: Mapping[str, Departure]

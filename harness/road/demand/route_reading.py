@@ -221,7 +221,6 @@ def _choices(path: Path, where: str, element: ElementTree.Element, named: NamedR
 
 
 def _named(path: Path, where: str, element: ElementTree.Element, named: NamedRoutes) -> tuple[RouteChoice, ...]:
-    """The routes of the name that an element gives."""
     name = required(path, element, "route")
     if name not in named.routes:
         raise UsageError.of(path, where, f"unknown route {name!r}", nearest(name, named.routes))

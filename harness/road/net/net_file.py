@@ -88,7 +88,6 @@ def check_net(path: Path) -> CheckedNet:
 
 
 def _named(element: ElementTree.Element) -> str:
-    """An element as messages name it."""
     if element.tag == "connection":
         return f"connection from {element.get('from')} to {element.get('to')}"
     return f"{element.tag} {element.get('id')}" if element.get("id") else str(element.tag)

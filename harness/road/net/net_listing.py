@@ -83,7 +83,6 @@ def listed_lane(lane: Lane) -> ListedLane:
 
 
 def listed_junctions(edges: Sequence[Edge]) -> list[ListedJunction]:
-    """The junctions at the ends of edges."""
     nodes = dict.fromkeys(node for edge in edges for node in (edge.getFromNode(), edge.getToNode()))
     kept = set(edges)
     return [

@@ -89,7 +89,6 @@ class Stream:
 
     @cached_property
     def inner(self) -> shapely.LineString:
-        """The link's line over the junction."""
         return _joined([line_over_junction(self._feeders.net, self.link)])
 
     @cached_property

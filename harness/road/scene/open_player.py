@@ -31,8 +31,6 @@ _CYCLING_CLASSES = ("bicycle", "scooter")
 
 @dataclass(frozen=True, kw_only=True)
 class OpenPlayer:
-    """A player of an open scene."""
-
     route: Route
     edges: tuple[str, ...]  # the route, from the start edge on
     vehicle_type: VehicleType

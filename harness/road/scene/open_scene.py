@@ -65,7 +65,6 @@ class OpenScene:
 
     @property
     def route_files(self) -> list[Path]:
-        """The scene's route file and additional files."""
         return [self.folder / each for each in (self.document.routes, *self.document.additional)]
 
     @cached_property

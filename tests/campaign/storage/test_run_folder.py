@@ -93,7 +93,8 @@ def changed(**changes: Any) -> str:
 
 
 @pytest.mark.parametrize(
-    "content", ["", changed()[:-20], "[]", "[" * 100_000, changed(stages={"../x-seed1": {}}), changed(versions={})]
+    "content",
+    ["", "\0" * 100, changed()[:-20], "[]", "[" * 100_000, changed(stages={"../x-seed1": {}}), changed(versions={})],
 )
 def test_manifest__a_damaged_one_is_named_and_left_as_it_is(content: str, folder: RunFolder) -> None:
     folder.manifest_file.write_text(content)

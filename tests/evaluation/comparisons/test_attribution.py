@@ -10,8 +10,7 @@ import pytest
 from scipy import stats
 
 from harness.evaluation.comparisons.attribution import attribute, examples
-from harness.evaluation.competence import AloneBound
-from harness.evaluation.trait_question import ALL_TRAITS, TraitQuestion
+from harness.evaluation.competence import ALL_TRAITS, AloneBound, TraitQuestion
 from tests.support.game_tables import arm, table
 
 OWN, WITHOUT = "naive_vs_speedy", "naive_vs_speedy_with_shoulder_glance_of_careful"

@@ -7,7 +7,7 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from harness.evaluation.comparisons.near_misses import ANY_CRITERION, by_criterion, near_misses
+from harness.evaluation.comparisons.arm_clauses import ANY_CRITERION, by_criterion, near_misses
 from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.tables import table_of
 

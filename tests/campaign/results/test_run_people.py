@@ -7,7 +7,7 @@ from typing import Any
 
 import pandas as pd
 
-from harness.campaign.results.realism_gate import declared_of, questions_of
+from harness.campaign.results.run_people import declared_of, questions_of
 from harness.evaluation.realism import DECLARED, INSIDE, NOT_COMPARABLE, OUTSIDE
 from harness.evaluation.tables import table_of
 from tests.support.plans import campaign_of, stages_of
