@@ -25,10 +25,9 @@ from harness.config.ego_perception import EgoPerception
 from harness.config.persona import Persona
 from harness.config.toml_reading import Document, read_document
 from harness.config.traits import traits_of
+from harness.drivers import driver_files, policy_origin
 from harness.drivers.car import car_of
-from harness.drivers.driver_files import sha256_of
 from harness.drivers.external import ExternalDriver, find_driver
-from harness.drivers.policy_origin import grouped, other_games
 from harness.errors import Problem, UsageError, collect
 from harness.game.roles import EGO
 from harness.road.scene.load_check import check_loads
@@ -198,15 +197,15 @@ def open_campaign(
         policies=policies,
         other_egos=other_egos,
         policy_drivers=policy_drivers,
-        learned_elsewhere=dict(grouped(elsewhere)),
-        hashes={_relative(file, each): sha256_of(each) for each in files},
+        learned_elsewhere=dict(policy_origin.grouped(elsewhere)),
+        hashes={_relative(file, each): driver_files.sha256_of(each) for each in files},
     )
 
 
 def _note_origin(driver: ExternalDriver, scene: OpenScene, persona: Persona | None, elsewhere: dict[str, str]) -> None:
     """Add to `elsewhere` how the games in which an ego's policy learned differ. Raises UsageError as `other_games`."""
     if driver.document is None and (
-        words := other_games(driver.place, scene.document, scene.world, player=EGO, persona=persona)
+        words := policy_origin.other_games(driver.place, scene.document, scene.world, player=EGO, persona=persona)
     ):
         elsewhere[driver.written] = words
 

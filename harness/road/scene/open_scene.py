@@ -20,8 +20,7 @@ from harness.game.start_range import StartRange
 from harness.game.world import World
 from harness.road.demand.route_file import Departure, RouteFile
 from harness.road.demand.warm_up import Snapshot, snapshots
-from harness.road.net import network
-from harness.road.net.levels import heights_of_players_roads
+from harness.road.net import levels, network
 from harness.road.scene.cartesian_road import CartesianRoads, cartesian_roads
 from harness.road.scene.following import NO_ROAD, RoadBehind, road_behind, with_follower_type
 from harness.road.scene.footway import opened_ground
@@ -183,7 +182,7 @@ def open_scene(folder: str | Path, ego_type: str | None = None) -> OpenScene:
         rail_lines=rail_lines,
         junctions=network.junctions_near(net, used),
         stripes=() if ground is None else ground.stripes,
-        roads_m=heights_of_players_roads(net, own),
+        roads_m=levels.heights_of_players_roads(net, own),
     )
     check_starts(files.file, scene.usual_starts, scene.world)
     return scene
