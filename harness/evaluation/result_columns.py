@@ -184,8 +184,8 @@ LEAGUE_MEASURES = (
     Column(
         "reason",
         TEXT,
-        "Why the row says nothing about how the ego copes with people: it can't drive the scene alone. Empty where it "
-        "can, and for `nobody`.",
+        "Why the row says nothing about how the ego copes with people: a player can't drive the scene alone. Empty "
+        "where both can, and for `nobody`.",
     ),
 )
 LEAGUE_RANKS = (

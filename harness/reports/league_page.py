@@ -47,7 +47,7 @@ def render_league(ego: str, table: pd.DataFrame, addresses: Sequence[str], faile
             tones=RISK_TONES,
             rows=[(address, list(_texts(row))) for row, address in zip(rows, addresses, strict=True)],
             failed=failed,
-            incapable={row["scene"]: row["reason"] for row in rows if row["reason"]},
+            not_answered=dict.fromkeys((row["scene"], row["reason"]) for row in rows if row["reason"]),
         )
     )
 
@@ -85,7 +85,7 @@ def sentence_of(row: Mapping[Any, Any]) -> str:
     fails = (
         f"The ego fails in {_counts(row)} games {who}: {percent(row['failure_rate'])} (95 %: {interval(low, high)})."
     )
-    return f"{fails} It can't drive the scene: {row['reason']}." if row["reason"] else fails
+    return f"{fails} Not answered: {row['reason']}." if row["reason"] else fails
 
 
 def person_in_words(person: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import shutil
 from pathlib import Path
@@ -75,14 +76,14 @@ def test_rows__an_ego_that_stands_runs_out_of_time(league: Path) -> None:
 
 def test_rows__of_people_say_nothing_where_the_ego_cannot_drive_the_scene_alone(league: Path) -> None:
     """They are the last, and the page says why."""
-    reason = "alone it reaches its goal in 0 of 3 games (0 %), below 97 %"
+    reason = "the ego brake can't drive this scene: alone it reaches its goal in 0 of 3 games (0 %), below 97 %"
     reasons = rows(league)["reason"]
-    assert {person: told for (_, person), told in reasons.items() if person == "nobody"} == {"nobody": ""}
-    assert set(reasons.drop("nobody", level="person")) == {reason}
+    assert reasons[reasons == ""].index.tolist() == [("paper_merge", "nobody"), ("red_light", "nobody")]
+    assert all(each.startswith(reason) for each in reasons.drop("nobody", level="person"))
     assert [person for _, person in reasons.index[:2]] == ["nobody", "nobody"]
-    page = (league / "league.html").read_text(encoding="utf-8")
-    assert all(f"The ego can’t drive {scene}: {reason}." in page for scene in ("paper_merge", "red_light"))
-    assert f"It can't drive the scene: {reason}." in (league / "junit.xml").read_text(encoding="utf-8")
+    page = html.unescape((league / "league.html").read_text(encoding="utf-8"))
+    assert all(f"{scene}: {reason}" in page for scene in ("paper_merge", "red_light"))
+    assert f"Not answered: {reason}" in (league / "junit.xml").read_text(encoding="utf-8")
 
 
 def test_rows__are_those_of_the_run_folders(league: Path) -> None:

@@ -143,6 +143,22 @@ def test_disk__that_takes_no_more_is_one_message(tmp_path: Path) -> None:
     assert tables(run) == tables(untrained_run())
 
 
+def test_disk__that_is_full_is_one_message(tmp_path: Path) -> None:
+    """A disk of 256 kB, where the machine lets us make one."""
+    campaign, run = write_campaign(tmp_path, **UNTRAINED), tmp_path / "run"
+    run.mkdir()
+    made = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=256k", "tmpfs", run], capture_output=True, check=False)
+    if made.returncode:
+        pytest.skip("only root can make a small disk")
+    try:
+        assert_one_message(harness("campaign", campaign, "--out", run, "--jobs", 1), "No space left on device")
+        subprocess.run(["mount", "-o", "remount,size=50m", run], check=True)
+        carried_out(campaign, run)
+        assert tables(run) == tables(untrained_run())
+    finally:
+        subprocess.run(["umount", run], check=True)
+
+
 def without_privileges(*arguments: object) -> subprocess.CompletedProcess[str]:
     """The command as somebody for whom permissions count, even where it is root who tests."""
     drop = ("setpriv", "--bounding-set", "-dac_override,-dac_read_search") if os.geteuid() == 0 else ()

@@ -1,6 +1,6 @@
 """The results of a league, from the run folders of its campaigns.
 
-league.csv     a row for each pairing, worst first; after them those of scenes that the ego can't drive alone
+league.csv     a row for each pairing, worst first; after them those with a player that can't drive the scene alone
 league.html    the matrix of scenes and people, and the rows; their cells open games in the reports of the scenes
 result.json    the rows, what failed, and the exit code
 junit.xml      a test for each pairing and each stage: an error where games could not be played
@@ -17,15 +17,18 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from harness.campaign.plan.alone_bounds import alone_bounds
+from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.results.ci_files import JUNIT, RESULT
 from harness.campaign.results.kept_results import RunResult
+from harness.campaign.storage.manifest import planned
 from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.versions import versions
-from harness.config.campaign import Competence
+from harness.config.campaign import Campaign
 from harness.errors import FAILED
-from harness.evaluation.comparisons.comparison import rate_cells
+from harness.evaluation.comparisons.comparison import games_by_arm, rate_cells
 from harness.evaluation.comparisons.preventability import by_regulation
-from harness.evaluation.competence import goals_alone
+from harness.evaluation.competence import gate
 from harness.evaluation.result_columns import NOBODY, SUMO_DRIVER
 from harness.evaluation.strategies import NAIVE_ALONE, NAIVE_VS_SUMO
 from harness.evaluation.tables import read_csv, table_of, write_csv
@@ -38,7 +41,6 @@ from harness.reports.provenance import scene_of
 
 _PLACED = {NAIVE_ALONE.name: NOBODY, NAIVE_VS_SUMO.name: SUMO_DRIVER}
 _NOT_FINISHED = "it is not finished"
-EGO_GOAL_SHARE = Competence().ego_goal_share
 _COPIED = (
     *("arm", "seed", "episodes", "errors", "failure_rate", "failure_rate_low", "failure_rate_high"),
     *("collisions", "rails", "timeouts", "mean_speed_mps"),
@@ -114,7 +116,9 @@ def _rows(ego: str, run: RunFolder, games: dict[tuple[str, str, int], str]) -> I
     summary, episodes, manoeuvres = (
         read_csv(run.path / f"{name}.csv") for name in ("summary", "episodes", "manoeuvres")
     )
-    scene = scene_of(run.manifest())
+    manifest, games_of = run.manifest(), games_by_arm(episodes)
+    scene, campaign = scene_of(manifest), Campaign.model_validate(manifest["campaign"], strict=False)
+    arms = {stage.name: stage.arm for stage in planned(manifest) if isinstance(stage, AssessmentStage)}
     file = run.path / "preventability.csv"
     prevented = read_csv(file) if file.is_file() else None
     page = (run.path / "report.html").read_text(encoding="utf-8")
@@ -123,16 +127,14 @@ def _rows(ego: str, run: RunFolder, games: dict[tuple[str, str, int], str]) -> I
         person = person_of(arm, row["persona"])
         if row["failure_rate"] != row["failure_rate"] and not row["errors"]:
             continue  # a persona alone
-        of_seed = episodes[episodes["seed"] == seed]
-        of_arm, alone = (of_seed[of_seed["arm"] == each] for each in (arm, NAIVE_ALONE.name))
+        of_arm = games_of[arm, seed]
         played = of_arm[of_arm["error"] == ""]
         brakes = manoeuvres[(manoeuvres["arm"] == arm) & (manoeuvres["seed"] == seed)]
         hard = brakes[(brakes["player"] == "ego") & (brakes["manoeuvre"] == "hard_brake")]["episode"].nunique()
         cells = {name: row[name] for name in _COPIED} | {"ego": ego, "scene": scene, "person": person}
         cells |= {"serious_injuries": played["mais3_risk_high"].sum() / len(played) if len(played) else np.nan}
         cells |= rate_cells("hard_brake_rate", hard, len(played))
-        goals = goals_alone(alone, "ego")
-        cells["reason"] = "" if person == NOBODY or goals.suffice(EGO_GOAL_SHARE) else goals.below(EGO_GOAL_SHARE)
+        cells["reason"] = "" if person == NOBODY else gate(alone_bounds(campaign, arms[arm]), seed, games_of)["reason"]
         of_regulation = [] if prevented is None else by_regulation(prevented[prevented["seed"] == seed], arm)
         for end in ("", "_low", "_high"):
             cells[f"preventable_rate{end}"] = of_regulation[0][f"from_start_rate{end}"] if of_regulation else np.nan
