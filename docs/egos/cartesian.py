@@ -23,7 +23,7 @@ from harness.game.arrays import FloatArray, IntArray
 from harness.game.cartesian_view import CartesianView
 from harness.game.initial_state import draw_initial_state
 
-STEPS, REACH_M = 40, 60.0
+STEPS, MARGIN_M = 40, 20.0
 
 
 class Watcher:
@@ -59,7 +59,7 @@ def view_of(scene_name: str) -> CartesianView:
 
 
 def draw(view: CartesianView, axes: Axes) -> None:
-    """Draw a view and its road, around the own car."""
+    """Draw a view and its road, from the own car to the goal and to all that it sees."""
     road = view.road
     for lane in road.lanes.values():
         axes.plot(*lane.line.T, color="0.75", linewidth=1.0)
@@ -76,9 +76,11 @@ def draw(view: CartesianView, axes: Axes) -> None:
         axes.annotate(
             "", (each.x_m + velocity[0], each.y_m + velocity[1]), (each.x_m, each.y_m), arrowprops={"arrowstyle": "->"}
         )
-        axes.text(each.x_m + 2.0, each.y_m + 2.0, f"{each.id}: {each.kind}")
-    axes.set(xlim=(view.x_m - REACH_M, view.x_m + REACH_M), ylim=(view.y_m - REACH_M, view.y_m + REACH_M))
-    axes.set(aspect="equal", xlabel="x_m, to the east", ylabel="y_m, to the north")
+        axes.text(each.x_m + 2.0, each.y_m + 2.0, f"{each.id}: {each.kind}", clip_on=True)
+    shown = [(view.x_m, view.y_m), (road.goal_x_m, road.goal_y_m), *((each.x_m, each.y_m) for each in view.objects)]
+    (left, bottom), (right, top) = np.min(shown, axis=0) - MARGIN_M, np.max(shown, axis=0) + MARGIN_M
+    axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
+    axes.set(xlabel="x_m, to the east", ylabel="y_m, to the north")
 
 
 def _box(axes: Axes, pose: tuple[float, float, float], size_m: tuple[float, float], colour: str) -> None:

@@ -30,7 +30,7 @@ from tests.support.repository import REPOSITORY
 from tests.support.tiny import CAREFUL, harness
 
 GAMES, SEEN, NOISE = np.array([0, 1]), np.zeros((2, SIZE), dtype=np.float32), np.zeros((2, 2))
-EXAMPLE = REPOSITORY / "egos" / "examples" / "cartesian" / "idm.toml"
+IDM, MPC = (REPOSITORY / "egos" / "examples" / "cartesian" / f"{name}.toml" for name in ("idm", "mpc"))
 PROGRAM = """
 import json, sys
 for line in sys.stdin:
@@ -140,17 +140,20 @@ def test_document__of_another_kind_has_no_such_table(tmp_path: Path) -> None:
         find_driver("net.toml", tmp_path / "campaign.toml", "ego.driver", allow_code=False)
 
 
-@pytest.mark.parametrize("name", ["roundabout", "merge", "left_across"])
-def test_example__reaches_the_goal_alone_in_every_game(name: str) -> None:
+@pytest.mark.parametrize(
+    ("example", "name"), [(IDM, "roundabout"), (IDM, "merge"), (IDM, "left_across"), (MPC, "roundabout")]
+)
+def test_example__reaches_the_goal_alone_in_every_game(example: Path, name: str) -> None:
     scene, careful = open_scene(name), read_document(CAREFUL, Persona)
-    driver = find_driver(str(EXAMPLE), EXAMPLE, "", allow_code=True).make(car_of(scene.world, EGO), sampled=False)
+    driver = find_driver(str(example), example, "", allow_code=True).make(car_of(scene.world, EGO), sampled=False)
     people = [None] * (len(scene.world.roles) - 1)
     alone = SeatedArm(name="naive_alone", scene=scene, drivers=(mixture_of(driver, careful), *people), seed=1)
     assert [game.played["ego_outcome"] for game in assess(alone, 5)] == ["goal"] * 5
 
 
-def test_example__conforms_to_the_protocol() -> None:
-    done = harness("check-driver", EXAMPLE, "--games", 2, "--allow-code")
+@pytest.mark.parametrize("example", [IDM, MPC])
+def test_example__conforms_to_the_protocol(example: Path) -> None:
+    done = harness("check-driver", example, "--games", 2, "--allow-code")
     assert done.returncode == 0, done.stdout + done.stderr
     assert "2 games at once, one of them reset in between: the same actions as alone" in done.stdout
 

@@ -80,8 +80,7 @@ class OpenScene:
     @cached_property
     def cartesian_roads(self) -> CartesianRoads:
         """The roads of the players as planners get them. They are read from the net."""
-        lines = {"edges": self.edges, "rail_lines": self.rail_lines}
-        return cartesian_roads(self.net_file, self.document, self.world, **lines)
+        return cartesian_roads(self.net_file, self.document, self.world, edges=self.edges, rail_lines=self.rail_lines)
 
     def vehicle(self, player: int) -> Departure:
         """A player's vehicle in the route file."""
