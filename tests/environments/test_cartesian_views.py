@@ -63,7 +63,7 @@ def observed(row: FloatArray, max_steering_rad: float) -> list[FloatArray]:
     return [np.array([entries[f"other{k}_{name}"] for name in names]) for k in seen]
 
 
-@pytest.mark.parametrize("persona", [None, "distracted"])
+@pytest.mark.parametrize("persona", [None, "speedy"])
 def test_view__has_the_bodies_of_the_observation(persona: str | None, merge: OpenScene, arena_of: Open) -> None:
     """Of the ego, which sees everything as it is, and of a person, who estimates distances and reacts late."""
     factors = HumanFactors()
