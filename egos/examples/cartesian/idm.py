@@ -7,15 +7,15 @@ import math
 
 from planning import SPACING_M, pursuit, run
 
-AHEAD, BEHIND = 120, 40  # points of the route's line that matter
+AHEAD, BEHIND = 120, 240  # points of the route's line that matter: of those behind, for who follows
 GRID_S, HORIZON_S = 0.5, 4.0  # of the prediction
 MOST_MPS2, HARDEST_MPS2, STANDSTILL_M = 2.0, 8.0, 2.0
 
 
 def meetings(each, line, first):
     """Where an object is, or will be at its velocity, on the route ahead: distance along it, speed along it."""
-    window = range(max(first - BEHIND, 0), min(first + AHEAD, len(line) - 1))
     for step in range(int(HORIZON_S / GRID_S)):
+        window = range(max(first - (0 if step else BEHIND), 0), min(first + AHEAD, len(line) - 1))
         x = each["x_m"] + step * GRID_S * each["velocity_x_mps"]
         y = each["y_m"] + step * GRID_S * each["velocity_y_mps"]
         k = min(window, key=lambda k: math.hypot(line[k][0] - x, line[k][1] - y))
