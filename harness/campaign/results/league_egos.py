@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from harness.campaign.results.league_table import person_of
+from harness.campaign.results.league_rows import person_of
 from harness.campaign.storage.run_folder import MANIFEST, RunFolder
 from harness.config.campaign import Assessment
 from harness.errors import UsageError
