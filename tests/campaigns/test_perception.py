@@ -10,6 +10,7 @@ import pytest
 
 from harness.config.ego_perception import EgoPerception
 from harness.config.toml_reading import read_document
+from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_columns import PERCEIVED
 from harness.evaluation.trace_file import SCHEMA
 from tests.support import shipped
@@ -50,7 +51,7 @@ def test_perception__each_arm_of_an_ego_is_played_without_errors_too(run: Path) 
 
 
 def test_perception__arms_without_errors_are_those_of_a_campaign_without_them(run: Path, unimpaired: Path) -> None:
-    of_run, plain = (pd.read_csv(each / "episodes.csv") for each in (run, unimpaired))
+    of_run, plain = (read_csv(each / "episodes.csv") for each in (run, unimpaired))
     plain = plain[plain["arm"].isin(ARMS)].drop(columns="arm").reset_index(drop=True)
     free = of_run[of_run["arm"].isin([f"error_free_{each}" for each in ARMS])]
     free = free[plain.columns].reset_index(drop=True)
