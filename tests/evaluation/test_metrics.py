@@ -30,7 +30,7 @@ def drive(outcome: Outcome = Outcome.GOAL, steers: bool = True, shielded: Any = 
     }
     series = {name: np.array(values) for name, values in {**of, **changes}.items()}
     shared = {"acceleration_mps2": series["acceleration_mps2"], "payoff": series["payoff"], "encounters": ()}
-    shared["shielded"] = None if shielded is None else np.array(shielded)
+    shared |= {"shielded": None if shielded is None else np.array(shielded), "perceived_share": {}.get}
     return SimpleNamespace(
         outcome=outcome, step_s=0.5, game=SimpleNamespace(steers=[steers]), player=0, of=series.__getitem__, **shared
     )
@@ -53,6 +53,8 @@ def test_metrics__by_hand() -> None:
         "payoff": 4.75,
         "shield_interventions_per_km": None,  # without a shield
         "shielded_share": None,
+        "lost_share": None,  # without perception errors
+        "ghost_share": None,
     }
 
 
