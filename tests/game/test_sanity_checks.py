@@ -332,6 +332,7 @@ def test_metric__is_a_number_or_unmeasured_at_every_place_of_every_route(
                 game=SimpleNamespace(steers=(True,)),
                 encounters=(),
                 shielded=None,
+                perceived_share=lambda column: None,
                 payoff=np.zeros(1),
                 acceleration_mps2=everywhere.state.acceleration_mps2[place, :1],
                 of=lambda name, place=place: getattr(everywhere, name)[place, :1],
