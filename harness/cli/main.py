@@ -11,7 +11,7 @@ from types import FrameType
 INTERRUPTED = "Interrupted."
 CONTINUES = f"{INTERRUPTED} Finished work is kept: run the same command again to continue."
 _CONTINUED = (["campaign"], ["demo"])
-_IMPORTS = "<frozen importlib"  # begins the names of the files of Python's own import
+_LOSING = ("<frozen importlib", f"{os.sep}llvmlite{os.sep}")  # in names of files: Python's own import, and compiling
 _AGAIN_S = 0.05
 
 
@@ -19,13 +19,13 @@ def main() -> None:
     """The `harness` command. Ctrl-C, SIGTERM and SIGHUP end it with one message on standard error, and with 128 plus
     the number of the signal as its exit code. A signal that is ignored, as by nohup, stays ignored.
 
-    A signal that arrives during an import takes effect after it: modules make other errors of a KeyboardInterrupt, or
-    ignore it.
+    A signal that arrives during an import, or while a function is compiled, takes effect after it: modules make other
+    errors of a KeyboardInterrupt, or ignore it.
     """
     received: list[int] = []
 
     def interrupt(number: int, frame: FrameType | None) -> None:
-        if _imports(frame):
+        if _loses_it(frame):
             again = threading.Timer(_AGAIN_S, os.kill, (os.getpid(), number))
             again.daemon = True
             again.start()
@@ -48,9 +48,9 @@ def main() -> None:
         sys.exit(128 + received[0])
 
 
-def _imports(frame: FrameType | None) -> bool:
-    """Whether a frame is that of an import, or of what an import runs."""
-    while frame is not None and not frame.f_code.co_filename.startswith(_IMPORTS):
+def _loses_it(frame: FrameType | None) -> bool:
+    """Whether a frame is one in which a KeyboardInterrupt may be lost, or of what such a frame runs."""
+    while frame is not None and not any(each in frame.f_code.co_filename for each in _LOSING):
         frame = frame.f_back
     return frame is not None
 

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import llvmlite.binding as llvm
 import pytest
 import typer
 from junitparser import JUnitXml
@@ -231,6 +232,22 @@ def test_main__interrupted_during_an_import_ends_after_it(
 
     def run() -> None:
         assert not hasattr(importlib.import_module("loaded_late"), "lost")
+        time.sleep(60.0)
+
+    monkeypatch.setattr("harness.cli.app.run", run)
+    assert run_command("campaign", "merge") == (143, "", f"{CONTINUES}\n")
+
+
+def test_main__interrupted_while_a_function_is_compiled_ends_after_it(
+    run_command: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, signal_is_default: None
+) -> None:
+    def run() -> None:
+        llvm.initialize_native_target()
+        llvm.initialize_native_asmprinter()
+        module = llvm.parse_assembly("define i32 @one() { ret i32 1 }")
+        engine = llvm.create_mcjit_compiler(module, llvm.Target.from_default_triple().create_target_machine())
+        engine.set_object_cache(lambda *_: signal.raise_signal(signal.SIGTERM))
+        engine.finalize_object()
         time.sleep(60.0)
 
     monkeypatch.setattr("harness.cli.app.run", run)
