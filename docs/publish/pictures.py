@@ -23,7 +23,18 @@ from tutorial_steps import carry_out
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
-SCENES = ("left_across", "priority_crossing", "red_light", "roundabout", "crossing", "zebra", "cyclist")
+SCENES = (
+    "left_across",
+    "priority_crossing",
+    "stop_sign",
+    "red_light",
+    "roundabout",
+    "on_ramp",
+    "brake",
+    "crossing",
+    "zebra",
+    "cyclist",
+)
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
 COLOURS = 256
 
