@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,14 +29,17 @@ settings.load_profile("harness")
 def pytest_configure() -> None:
     """Make the session's shared folder in the first process, before pytest-xdist starts others."""
     shared_folder()
-    gc.disable()  # until all tests are collected
 
 
-def pytest_collection_finish() -> None:
-    """Take the libraries and tests out of garbage collection: it would walk them again and again, for half the time."""
-    gc.collect()
-    gc.freeze()
-    gc.enable()
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Exclude what collection has loaded from garbage collection, which takes long to go through it."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.enable()
+        gc.freeze()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

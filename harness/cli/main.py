@@ -11,7 +11,7 @@ from types import FrameType
 INTERRUPTED = "Interrupted."
 CONTINUES = f"{INTERRUPTED} Finished work is kept: run the same command again to continue."
 _CONTINUED = (["campaign"], ["demo"])
-_LOSING = ("<frozen importlib", f"{os.sep}llvmlite{os.sep}")  # in names of files: Python's own import, and compiling
+_DELAYING = ("<frozen importlib", f"{os.sep}llvmlite{os.sep}")  # parts of file names: Python's import, the compiler
 _AGAIN_S = 0.05
 
 
@@ -25,7 +25,7 @@ def main() -> None:
     received: list[int] = []
 
     def interrupt(number: int, frame: FrameType | None) -> None:
-        if _loses_it(frame):
+        if _delays(frame):
             again = threading.Timer(_AGAIN_S, os.kill, (os.getpid(), number))
             again.daemon = True
             again.start()
@@ -48,9 +48,9 @@ def main() -> None:
         sys.exit(128 + received[0])
 
 
-def _loses_it(frame: FrameType | None) -> bool:
-    """Whether a frame is one in which a KeyboardInterrupt may be lost, or of what such a frame runs."""
-    while frame is not None and not any(each in frame.f_code.co_filename for each in _LOSING):
+def _delays(frame: FrameType | None) -> bool:
+    """Whether a frame is that of an import or of the compiler, or of what one of them runs."""
+    while frame is not None and not any(each in frame.f_code.co_filename for each in _DELAYING):
         frame = frame.f_back
     return frame is not None
 
