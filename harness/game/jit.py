@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import logging
+import os
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
@@ -72,14 +73,14 @@ def _turn(folder: Path) -> Iterator[None]:
     with contextlib.ExitStack() as stack:
         # a file system without locks is no error; a lock made of a file's existence would outlive its process
         with contextlib.suppress(OSError, NotImplementedError):
-            stack.enter_context(_lock(folder))
+            stack.enter_context(_lock(folder, os.getpid()))
         yield
 
 
 @cache
-def _lock(folder: Path) -> contextlib.AbstractContextManager[object]:
-    """The lock of all processes that use a folder of the cache. A thread may enter it again: compiling a function may
-    compile those that it calls. Raises OSError if the folder can't be written."""
+def _lock(folder: Path, process: int) -> contextlib.AbstractContextManager[object]:
+    """This process's lock of a folder of the cache that processes share. A thread may enter it again: compiling a
+    function may compile those that it calls. Raises OSError if the folder can't be written."""
     from filelock import FileLock  # imports asyncio and sqlite3: only for processes that run compiled code
 
     folder.mkdir(parents=True, exist_ok=True)

@@ -59,6 +59,11 @@ def command_of(pid: int) -> bytes:
     return _read(f"/proc/{pid}/cmdline")
 
 
+def name_of(pid: int) -> str:
+    """The name that a process goes by; empty if it has ended."""
+    return _read(f"/proc/{pid}/comm").decode().strip()
+
+
 def _running() -> Iterator[tuple[int, int, int]]:
     """Each process that has not ended, its parent and its session."""
     for folder in Path("/proc").iterdir():

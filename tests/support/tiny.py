@@ -10,7 +10,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import pytest
 
@@ -19,8 +19,8 @@ from harness.cli.main import CONTINUES
 from harness.config.training import Training
 from harness.errors import NOT_ACCEPTED
 from tests.support import shipped
-from tests.support.forked_command import can_fork, run_forked
-from tests.support.processes import children_of, command_of, in_session
+from tests.support.forked_command import WORKER, Forked, begin_forked, can_fork, run_forked
+from tests.support.processes import children_of, command_of, in_session, name_of
 from tests.support.repository import REPOSITORY
 from tests.support.shared import built_once
 
@@ -40,6 +40,7 @@ TRAINING: dict[str, Any] = {
     "epochs": 2,
     "network": [8],
 }
+Process: TypeAlias = "subprocess.Popen[str] | Forked"
 UNGATED: dict[str, Any] = {"ego_goal_share": 0.0, "non_ego_goal_share": 0.0, "non_ego_like_people": False}
 """Bounds that every player meets: tiny trainings learn nothing, and most tests are about what comes after them."""
 PERSONA = """\
@@ -116,9 +117,11 @@ def without(folder: Path, *packages: str) -> dict[str, str]:
     return {**os.environ, "PYTHONPATH": os.pathsep.join([str(folder), *sys.path])}
 
 
-def begin(*arguments: object) -> subprocess.Popen[str]:
-    """Start the command as the leader of a process group, as a shell does, whatever is ignored where the tests run."""
+def begin(*arguments: object) -> Process:
+    """Start the command as the leader of a session, as a terminal does, whatever is ignored where the tests run."""
     command = [str(HARNESS), *map(str, arguments)]
+    if can_fork({}):
+        return begin_forked(command)
     return subprocess.Popen(
         command,
         stdout=subprocess.PIPE,
@@ -134,7 +137,7 @@ def _heed_all() -> None:
         signal.signal(each, signal.SIG_DFL)
 
 
-def end(process: subprocess.Popen[str]) -> str:
+def end(process: Process) -> str:
     """Wait for the command; what it printed. Whatever is left of it is killed, so that a failed test leaves nothing."""
     try:
         return process.communicate(timeout=PATIENCE_S)[0]
@@ -146,7 +149,7 @@ def end(process: subprocess.Popen[str]) -> str:
 
 
 def workers_of(parent: int) -> list[int]:
-    return [pid for pid in children_of(parent) if b"worker_pool" in command_of(pid)]
+    return [pid for pid in children_of(parent) if WORKER in command_of(pid).decode() or name_of(pid) == WORKER]
 
 
 def wait_for(condition: Callable[[], object], what: str) -> None:
@@ -158,12 +161,12 @@ def wait_for(condition: Callable[[], object], what: str) -> None:
         time.sleep(0.02)
 
 
-def wait_until_nothing_is_left(process: subprocess.Popen[str]) -> None:
+def wait_until_nothing_is_left(process: Process) -> None:
     """Wait until no process of a command runs."""
     wait_for(lambda: not in_session(process.pid), "no process of it is left")
 
 
-def assert_interrupted(process: subprocess.Popen[str], code: int) -> None:
+def assert_interrupted(process: Process, code: int) -> None:
     """The command ends with this exit code and one message, and leaves no process."""
     printed = process.communicate(timeout=PATIENCE_S)[0]
     assert process.returncode == code, printed
