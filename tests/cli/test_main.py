@@ -27,10 +27,11 @@ from harness.cli.main import CONTINUES, INTERRUPTED, main
 from harness.errors import FAILED, NOT_ACCEPTED, USAGE_ERROR, SimulationError
 from harness.evaluation.tables import read_csv
 from harness.evaluation.worst_first import FAILURES
+from tests.support.forked_command import can_fork
 from tests.support.tiny import (
     TABLES,
     assert_interrupted,
-    begin,
+    begin_program,
     learned_run,
     sumo_run,
     tables,
@@ -203,11 +204,15 @@ def test_main__an_error_of_sumo_is_one_message(
     assert (result.code, result.err.strip()) == (FAILED, "SimulationError: SUMO died")
 
 
+def test_commands_of_tests__are_forks_whatever_libraries_have_set() -> None:
+    assert can_fork({})
+
+
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGINT, 130)])
 def test_campaign__ended_while_it_loads_its_modules_says_that_it_continues(
     number: signal.Signals, code: int, tmp_path: Path
 ) -> None:
-    process = begin("campaign", "merge", "--out", tmp_path / "run")
+    process = begin_program("campaign", "merge", "--out", tmp_path / "run")
     wait_for(lambda: caught_by(process.pid) >> (signal.SIGHUP - 1) & 1, "the handlers of the signals")
     process.send_signal(number)
     assert_interrupted(process, code)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import logging
 import os
@@ -66,6 +67,17 @@ def test_turn__of_a_folder_passes_to_the_next_process_when_its_process_dies(tmp_
         for process in filter(None, (first, second, third)):
             process.kill()
             process.communicate()
+
+
+def test_turn__a_fork_of_a_process_that_had_one_takes_its_own(cache: Path) -> None:
+    with jit._turn(cache):
+        pass
+    child = os.fork()
+    if child == 0:
+        with contextlib.suppress(BaseException), jit._turn(cache):
+            os._exit(0)
+        os._exit(1)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
 
 
 def median_of_sorted(values: np.ndarray) -> float:

@@ -119,9 +119,12 @@ def without(folder: Path, *packages: str) -> dict[str, str]:
 
 def begin(*arguments: object) -> Process:
     """Start the command as the leader of a session, as a terminal does, whatever is ignored where the tests run."""
+    return begin_forked([str(HARNESS), *map(str, arguments)]) if can_fork({}) else begin_program(*arguments)
+
+
+def begin_program(*arguments: object) -> subprocess.Popen[str]:
+    """As `begin`, by the program itself, for tests of how it starts."""
     command = [str(HARNESS), *map(str, arguments)]
-    if can_fork({}):
-        return begin_forked(command)
     return subprocess.Popen(
         command,
         stdout=subprocess.PIPE,

@@ -20,7 +20,7 @@ from tests.support.plans import training_of as stage
 from tests.support.tiny import (
     UNTRAINED,
     assert_interrupted,
-    begin,
+    begin_program,
     carried_out,
     tables,
     untrained_run,
@@ -167,7 +167,7 @@ def test_run_stages__short_of_memory_is_one_message_and_the_rest_goes_on(tmp_pat
 
 def test_campaign__interrupted_while_its_workers_start_is_uninterrupted_when_it_is_run_again(tmp_path: Path) -> None:
     campaign, run_folder = write_campaign(tmp_path, **UNTRAINED), tmp_path / "run"
-    process = begin("campaign", campaign, "--out", run_folder, "--jobs", 1)
+    process = begin_program("campaign", campaign, "--out", run_folder, "--jobs", 1)
     wait_for(lambda: workers_of(process.pid), "the first worker")
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does
     assert_interrupted(process, 130)
