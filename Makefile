@@ -76,8 +76,9 @@ $(INSTALLED): requirements.lock pyproject.toml
 	    echo "$(PYTHON) is not a Python of 3.10 to 3.13: name one, e.g. make install PYTHON=python3.12" >&2; exit 1; }
 	@$(PYTHON) -m venv .venv || { \
 	    echo "$(PYTHON) can't make virtual environments (on Debian and Ubuntu: apt-get install python3-venv)" >&2; exit 1; }
-	$(BIN)/python -m pip install --disable-pip-version-check -r requirements.lock
-	$(BIN)/python -m pip install --disable-pip-version-check --no-deps --no-build-isolation -e .
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check uv
+	$(BIN)/uv pip install --python $(BIN)/python -r requirements.lock
+	$(BIN)/uv pip install --python $(BIN)/python --no-deps --no-build-isolation -e .
 	@$(BIN)/python -c 'import libsumo' || { \
 	    echo "SUMO lacks system libraries (on Debian and Ubuntu:" \
 	        "apt-get install libatomic1 libgl1 libx11-6 libxext6 libxrender1)" >&2; exit 1; }

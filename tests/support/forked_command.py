@@ -180,7 +180,8 @@ def serve(descriptor: int) -> None:
             *streams, answer = descriptors
             pid = os.fork()
             if pid == 0:
-                _carry_out(*json.loads(request), streams)
+                command, folder = json.loads(request)
+                _carry_out(command, folder, streams)
             for each in streams:
                 os.close(each)
             os.write(answer, pid.to_bytes(8, "little"))
@@ -220,15 +221,15 @@ def _keep_only(streams: Sequence[int], *others: int) -> None:
 
     The numbers of the others stay taken: an object that closes its own must close no file of this process.
     """
-    for number in _TERMINATING:
-        signal.signal(number, signal.SIG_DFL)
-    for number, each in enumerate(streams):
-        os.dup2(each, number)
+    for each in _TERMINATING:
+        signal.signal(each, signal.SIG_DFL)
+    for number, stream in enumerate(streams):
+        os.dup2(stream, number)
     nowhere = os.open(os.devnull, os.O_RDWR)
-    for each in map(int, os.listdir("/proc/self/fd")):
-        if each > 2 and each not in (nowhere, *others):
+    for descriptor in map(int, os.listdir("/proc/self/fd")):
+        if descriptor > 2 and descriptor not in (nowhere, *others):
             with contextlib.suppress(OSError):  # the listing's own
-                os.dup2(nowhere, each, inheritable=False)
+                os.dup2(nowhere, descriptor, inheritable=False)
 
 
 def _end(code: int) -> NoReturn:
