@@ -61,9 +61,9 @@ check: install ## lint, formatting and types, in under half a minute
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-lock: ## rewrite requirements.lock with the newest versions that pyproject.toml allows (needs uv)
+lock: install ## rewrite requirements.lock with the newest versions that pyproject.toml allows
 	grep '^#' requirements.lock > requirements.lock.new
-	uv pip compile --quiet --universal --python-version 3.10 --fork-strategy fewest --extra dev \
+	$(BIN)/uv pip compile --quiet --universal --python-version 3.10 --fork-strategy fewest --extra dev \
 	    --no-annotate --no-header --upgrade $(ARGS) pyproject.toml >> requirements.lock.new
 	mv requirements.lock.new requirements.lock
 
