@@ -1,7 +1,7 @@
 """Documents as nobody should write them: a project in order, ways to spoil it, and what must come of each.
 
 Whatever is wrong: exit code 2, one line that names file and key, no traceback, nothing written, no process left,
-within `most_cpu_s()` of work and, on a machine that is busy with other things, `PATIENCE_S` in all.
+within `MOST_CPU_S` of work and, on a machine that is busy with other things, `PATIENCE_S` in all.
 """
 
 from __future__ import annotations
@@ -9,16 +9,13 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import resource
 import shutil
 import stat
-import subprocess
 import tempfile
 import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 
 import pytest
@@ -34,10 +31,9 @@ from harness.errors import UsageError
 from tests.support.policies import some_policy
 from tests.support.repository import REPOSITORY
 from tests.support.shared import built_once
-from tests.support.tiny import CAREFUL, HARNESS, PATIENCE_S, sumo_run
+from tests.support.tiny import CAREFUL, PATIENCE_S, sumo_run
 
 MOST_CPU_S = 5.0
-MOST_CHECKS = 3.0  # on an ordinary machine, checks of the project in order take together less than MOST_CPU_S
 CAMPAIGN, EGO, PERSONA = "campaigns/tiny.toml", "personas/careful.toml", "personas/anna.toml"
 SCENE, NET, ROUTES = "networks/road/scene.toml", "networks/road/merge.net.xml", "networks/road/merge.rou.xml"
 TENSORS, CARD = "policies/mine/policy.safetensors", "policies/mine/policy.json"
@@ -377,22 +373,6 @@ class Desk:
         assert children() == running, "a process is left"
 
 
-@cache
-def most_cpu_s() -> float:
-    """Processor time that a bad input may take: on a machine that takes longer for a check of the project in order than
-    ordinary ones do, so much more."""
-    with tempfile.TemporaryDirectory() as folder:
-        project, worked = write_project(Path(folder)), children_cpu_s()
-        subprocess.run([HARNESS, CHECK[0], project / CHECK[1]], capture_output=True, check=True)
-        return max(MOST_CPU_S, MOST_CHECKS * (children_cpu_s() - worked))
-
-
-def children_cpu_s() -> float:
-    """Processor time of the processes that this one has started and that have ended."""
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
-
-
 def assert_refused(said: Said, words: tuple[str, ...]) -> None:
     assert said.code == 2, said.out + said.err
     assert said.out == ""
@@ -400,5 +380,5 @@ def assert_refused(said: Said, words: tuple[str, ...]) -> None:
     lines = said.err.splitlines()
     assert any(all(word in line for word in words) for line in lines), f"{words} not in: {said.err[:2000]}"
     assert all(len(line) < 10_000 and line.isprintable() for line in lines)
-    assert said.cpu_s < most_cpu_s(), f"it took {said.cpu_s:.1f} s of work"
+    assert said.cpu_s < MOST_CPU_S, f"it took {said.cpu_s:.1f} s of work"
     assert said.seconds < PATIENCE_S, f"it took {said.seconds:.1f} s"

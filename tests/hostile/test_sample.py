@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import resource
 import shutil
 import subprocess
 from pathlib import Path
@@ -12,17 +13,7 @@ import pytest
 from tests.hostile.bad_documents import CAMPAIGNS, PERSONAS, POLICIES, SCENES
 from tests.hostile.bad_roads import NETS, ROUTE_FILES
 from tests.hostile.bad_run_folders import RUNS
-from tests.hostile.inputs import (
-    CHECK,
-    Bad,
-    Said,
-    assert_refused,
-    children_cpu_s,
-    seal,
-    traces_of,
-    write_project,
-    write_run,
-)
+from tests.hostile.inputs import CHECK, Bad, Said, assert_refused, seal, traces_of, write_project, write_run
 from tests.support.processes import in_session
 from tests.support.tiny import HARNESS, PATIENCE_S
 
@@ -66,7 +57,7 @@ def test_command__refuses_a_bad_input_and_leaves_nothing_behind(bad: Bad, tmp_pa
         (tmp_path / name).mkdir()
     before = traces_of(tmp_path)
     verb, named, *more = ("campaign", *bad.command[1:]) if bad.command == CHECK else bad.command
-    worked = children_cpu_s()
+    worked = _cpu_s()
     command = subprocess.Popen(
         [HARNESS, verb, project / named, *more],
         cwd=tmp_path / "here",
@@ -81,9 +72,14 @@ def test_command__refuses_a_bad_input_and_leaves_nothing_behind(bad: Bad, tmp_pa
     finally:
         left = in_session(command.pid)
         command.kill()
-    assert_refused(Said(command.returncode, out, err, 0.0, children_cpu_s() - worked), bad.words)
+    assert_refused(Said(command.returncode, out, err, 0.0, _cpu_s() - worked), bad.words)
     assert left == []
     assert traces_of(tmp_path) == before
+
+
+def _cpu_s() -> float:
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def test_inputs__that_were_tried_are_many_and_each_another(tmp_path: Path) -> None:
