@@ -1,7 +1,7 @@
 """Documents as nobody should write them: a project in order, ways to spoil it, and what must come of each.
 
 Whatever is wrong: exit code 2, one line that names file and key, no traceback, nothing written, no process left,
-within `MOST_CPU_S` of work and, on a machine that is busy with other things, `PATIENCE_S` in all.
+within `MOST_CPU_S` of an ordinary machine's work and, on one that is busy with other things, `PATIENCE_S` in all.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from tests.support.policies import some_policy
 from tests.support.repository import REPOSITORY
 from tests.support.shared import built_once
 from tests.support.tiny import CAREFUL, PATIENCE_S, sumo_run
+from tests.support.work import assert_work
 
 MOST_CPU_S = 5.0
 CAMPAIGN, EGO, PERSONA = "campaigns/tiny.toml", "personas/careful.toml", "personas/anna.toml"
@@ -380,5 +381,5 @@ def assert_refused(said: Said, words: tuple[str, ...]) -> None:
     lines = said.err.splitlines()
     assert any(all(word in line for word in words) for line in lines), f"{words} not in: {said.err[:2000]}"
     assert all(len(line) < 10_000 and line.isprintable() for line in lines)
-    assert said.cpu_s < MOST_CPU_S, f"it took {said.cpu_s:.1f} s of work"
+    assert_work(said.cpu_s, MOST_CPU_S)
     assert said.seconds < PATIENCE_S, f"it took {said.seconds:.1f} s"

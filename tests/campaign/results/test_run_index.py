@@ -24,6 +24,7 @@ from tests.support.pages import Page
 from tests.support.repository import REPOSITORY
 from tests.support.serving import read, serving
 from tests.support.tiny import harness, learned_run, sumo_run
+from tests.support.work import assert_work
 
 pytestmark = pytest.mark.slow
 
@@ -178,5 +179,5 @@ def test_index__of_200_runs_takes_a_second_of_processor_time(tmp_path: Path) -> 
             shutil.copy(REPOSITORY / "reports" / "merge" / name, run / name)
     begun = time.process_time()
     page = render_index("reports", runs_in(tmp_path))
-    assert time.process_time() - begun < 2.0  # twice as long where other programs share the processor's cores
+    assert_work(time.process_time() - begun, 2.0)  # twice as long where other programs share the processor's cores
     assert "200 of 200 runs" in page

@@ -1,0 +1,30 @@
+"""Bounds on processor time, which are meant for an ordinary machine: on a slower one, they are that much longer."""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import sys
+from functools import cache
+
+IMPORT_S = 2.0  # processor time of `import torch` on an idle machine with two cores, on which bounds were set
+
+
+def assert_work(took_s: float, most_s: float) -> None:
+    """Assert that what took `took_s` of processor time takes less than `most_s` on an ordinary machine."""
+    if took_s >= most_s:
+        most_s *= slowness()
+    assert took_s < most_s, f"it took {took_s:.1f} s of work; the bound on this machine is {most_s:.1f} s"
+
+
+@cache
+def slowness() -> float:
+    """How much longer than on an ordinary machine work takes here: 1 at least."""
+    before = _children_s()
+    subprocess.run([sys.executable, "-c", "import torch"], check=True, timeout=600.0)
+    return max(1.0, (_children_s() - before) / IMPORT_S)
+
+
+def _children_s() -> float:
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
