@@ -66,6 +66,8 @@ def columns_of(names: Iterable[str]) -> Mapping[str, Column]:
 
 def _cast(column: pd.Series, dtype: str) -> pd.Series:
     column = column.reset_index(drop=True)
+    if column.dtype == dtype != TEXT:
+        return column
     try:
         if dtype == TEXT:
             text = column.astype(object).where(column.notna(), "")

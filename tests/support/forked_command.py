@@ -164,6 +164,7 @@ def serve(descriptor: int) -> None:
     """Fork a child for each request and tell how it ended, until the other end of the socket is closed."""
     for name in PRELOADED:
         import_module(name)
+    _play()
     gc.freeze()  # a collection would copy the memory that children share
     requests, sources = socket.socket(fileno=descriptor), selectors.DefaultSelector()
     sources.register(requests, selectors.EVENT_READ)
@@ -186,6 +187,15 @@ def serve(descriptor: int) -> None:
                 os.close(each)
             os.write(answer, pid.to_bytes(8, "little"))
             sources.register(os.pidfd_open(pid), selectors.EVENT_READ, (pid, answer))
+
+
+def _play() -> None:
+    """Play a game, which loads the compiled functions that most games take."""
+    from harness.road.scene.open_scene import open_scene
+    from tests.support.rollouts import Steady, arm, play
+    from tests.support.tiny import PAPER_MERGE
+
+    play(arm(open_scene(PAPER_MERGE), Steady(), Steady()), 1)
 
 
 def _tell_end(pid: int, answer: int) -> None:
