@@ -16,6 +16,7 @@ from harness.game.quantities import Quantities
 from harness.game.state import Bodies, State
 from harness.game.world import World
 from harness.road.scene.open_scene import OpenScene, open_scene
+from tests.support.forked_command import remember_environment
 from tests.support.repository import LISTS_OF_TESTS, REPOSITORY, listed_tests
 from tests.support.roads import nearest_station_m
 from tests.support.scenes import build_scene, run_sumo_program
@@ -50,6 +51,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             test = item.nodeid.partition("[")[0]
             if test in listed or test.partition("::")[0] in listed:
                 item.add_marker(mark)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup() -> None:
+    """Let what libraries and earlier tests have set in the environment be part of what commands are forked in."""
+    remember_environment()
 
 
 @pytest.fixture(scope="session")

@@ -204,8 +204,10 @@ def test_main__an_error_of_sumo_is_one_message(
     assert (result.code, result.err.strip()) == (FAILED, "SimulationError: SUMO died")
 
 
-def test_commands_of_tests__are_forks_whatever_libraries_have_set() -> None:
+def test_commands_of_tests__are_forks_unless_a_test_changes_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     assert can_fork({})
+    monkeypatch.setenv("HARNESS_OF_THIS_TEST", "set")
+    assert not can_fork({})
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGINT, 130)])

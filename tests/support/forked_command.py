@@ -27,7 +27,6 @@ from tempfile import TemporaryFile
 from typing import IO, Any, NoReturn
 
 from tests.support.repository import REPOSITORY
-from tests.support.shared import VARIABLE
 
 PRELOADED = (
     "harness.cli.app",
@@ -53,22 +52,17 @@ def can_fork(options: Mapping[str, object]) -> bool:
     return options.keys() <= {"cwd"} and _environment() == _ENVIRONMENT
 
 
+def remember_environment() -> None:
+    """Let commands be forks until the environment changes: what libraries have set in it by now does not matter."""
+    _ENVIRONMENT.clear()
+    _ENVIRONMENT.update(_environment())
+
+
 def _environment() -> dict[str, str]:
-    return {name: value for name, value in os.environ.items() if name not in _NOT_OF_COMMANDS}
+    return {name: value for name, value in os.environ.items() if name != "PYTEST_CURRENT_TEST"}
 
 
-# What libraries set in a process that imports them, and what tests set for one another.
-_NOT_OF_COMMANDS = {
-    VARIABLE,
-    "PYGAME_HIDE_SUPPORT_PROMPT",
-    "PROJ_DATA",
-    "PROJ_LIB",
-    "PYTEST_CURRENT_TEST",
-    "RAY_CLIENT_MODE",
-    "SDL_AUDIODRIVER",
-    "SUMO_HOME",
-}
-_ENVIRONMENT = _environment()
+_ENVIRONMENT: dict[str, str] = _environment()
 
 
 @dataclass
@@ -138,7 +132,7 @@ def run_forked(
 def _fork(command: Sequence[str], folder: Path | str, streams: Sequence[IO[Any]]) -> Forked:
     ours, theirs = socket.socketpair()
     with theirs:
-        request = json.dumps([list(command), str(folder)]).encode()
+        request = json.dumps([list(command), str(folder), _environment()]).encode()
         requests, _ = _server(os.getpid())
         socket.send_fds(requests, [request], [*(each.fileno() for each in streams), theirs.fileno()])
     return Forked(list(command), int.from_bytes(ours.recv(8), "little"), ours)
@@ -181,8 +175,7 @@ def serve(descriptor: int) -> None:
             *streams, answer = descriptors
             pid = os.fork()
             if pid == 0:
-                command, folder = json.loads(request)
-                _carry_out(command, folder, streams)
+                _carry_out(*json.loads(request), streams)
             for each in streams:
                 os.close(each)
             os.write(answer, pid.to_bytes(8, "little"))
@@ -205,13 +198,15 @@ def _tell_end(pid: int, answer: int) -> None:
     os.close(answer)
 
 
-def _carry_out(command: list[str], folder: str, streams: Sequence[int]) -> NoReturn:
+def _carry_out(command: list[str], folder: str, environment: dict[str, str], streams: Sequence[int]) -> NoReturn:
     from harness.campaign.execution import worker_pool
     from harness.cli.main import main
 
     os.setsid()
     _keep_only(streams)
     os.chdir(folder)
+    os.environ.clear()
+    os.environ.update(environment)
     sys.argv = command
     worker_pool.start_process = _start_worker  # type: ignore[assignment]
     code = 1
