@@ -80,6 +80,7 @@ JIT_MAY_IMPORT = GAME_MAY_IMPORT | {
     "filelock",
     "logging",
     "numba",
+    "os",
     "pathlib",
     "platformdirs",
     "threading",
@@ -259,7 +260,7 @@ def test_lists_of_tests__each_line_names_a_test_and_every_room_keeps_fast_ones()
     known = {label(path) for path in tests} | {
         f"{label(path)}::{name}" for path, names in tests.items() for name in names
     }
-    listed = set().union(*map(listed_tests, LISTS_OF_TESTS))
+    listed = {test for mark in LISTS_OF_TESTS for test in listed_tests(mark)}
     assert sorted(listed - known) == []
     fast = {path for path, names in tests.items() if label(path) not in listed and names - named_in(path, listed)}
     folders = {path.relative_to(REPOSITORY / "tests").parts[0] for path in fast}
