@@ -13,10 +13,11 @@ import shutil
 import stat
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rich.console import Console
@@ -324,6 +325,16 @@ def children() -> set[str]:
     """The processes that this one has started and that are there still."""
     lists = Path("/proc/self/task").glob("*/children")
     return {child for each in lists for child in each.read_text().split()}
+
+
+ONE_IN = 8
+
+
+def all_at_release(rows: Sequence[Bad]) -> list[Any]:
+    """A case for each row: `make test` tries one in `ONE_IN` of them, `make test-release` all."""
+    return [
+        pytest.param(row, id=repr(row), marks=[pytest.mark.release] if k % ONE_IN else []) for k, row in enumerate(rows)
+    ]
 
 
 # --- what must come of it ---------------------------------------------------------------------------------------------

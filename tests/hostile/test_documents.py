@@ -9,7 +9,9 @@ import pytest
 from tests.hostile.bad_documents import CAMPAIGNS, PERSONAS, POLICIES, SCENES
 from tests.hostile.bad_roads import NETS, ROUTE_FILES
 from tests.hostile.bad_run_folders import LIST, REPORT, RUNS
-from tests.hostile.inputs import CHECK, Bad, Desk, traces_of, write_run
+from tests.hostile.inputs import CHECK, Bad, Desk, all_at_release, traces_of, write_run
+
+DOCUMENTS = [*CAMPAIGNS, *PERSONAS, *SCENES, *NETS, *ROUTE_FILES, *POLICIES]
 
 
 @pytest.fixture
@@ -21,7 +23,7 @@ def test_project__is_in_order_before_it_is_spoiled(desk: Desk) -> None:
     assert desk.run(CHECK).code == 0
 
 
-@pytest.mark.parametrize("bad", [*CAMPAIGNS, *PERSONAS, *SCENES, *NETS, *ROUTE_FILES, *POLICIES], ids=repr)
+@pytest.mark.parametrize("bad", all_at_release(DOCUMENTS))
 def test_document__that_is_wrong(bad: Bad, desk: Desk) -> None:
     desk.refuses(bad)
 
@@ -35,7 +37,7 @@ def test_run__is_in_order_before_it_is_spoiled(desk: Desk) -> None:
     assert traces_of(desk.folder) == before, "a report from the same folder is the same"
 
 
-@pytest.mark.parametrize("bad", RUNS, ids=repr)
+@pytest.mark.parametrize("bad", all_at_release(RUNS))
 def test_run__that_is_wrong(bad: Bad, desk: Desk) -> None:
     write_run(desk.folder)
     desk.refuses(bad)

@@ -13,7 +13,17 @@ import pytest
 from tests.hostile.bad_documents import CAMPAIGNS, PERSONAS, POLICIES, SCENES
 from tests.hostile.bad_roads import NETS, ROUTE_FILES
 from tests.hostile.bad_run_folders import RUNS
-from tests.hostile.inputs import CHECK, Bad, Said, assert_refused, seal, traces_of, write_project, write_run
+from tests.hostile.inputs import (
+    CHECK,
+    Bad,
+    Said,
+    all_at_release,
+    assert_refused,
+    seal,
+    traces_of,
+    write_project,
+    write_run,
+)
 from tests.support.processes import in_session
 from tests.support.tiny import HARNESS, PATIENCE_S
 
@@ -46,7 +56,7 @@ def test_sample__has_what_it_names() -> None:
 
 
 @pytest.mark.slow  # a process each, of a second and a half
-@pytest.mark.parametrize("bad", SAMPLE, ids=repr)
+@pytest.mark.parametrize("bad", all_at_release(SAMPLE))
 def test_command__refuses_a_bad_input_and_leaves_nothing_behind(bad: Bad, tmp_path: Path) -> None:
     project = write_project(tmp_path)
     if bad.command != CHECK:
