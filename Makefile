@@ -10,7 +10,7 @@ PYTEST := $(BIN)/pytest -n auto --maxprocesses 4 --dist worksteal
 INSTALLED := .venv/installed
 
 .DEFAULT_GOAL := help
-.PHONY: help install demo campaign quick test test-release test-esmini test-fast wheel coverage bench publish docs check lock clean
+.PHONY: help install demo campaign quick test test-release test-esmini wheel coverage bench publish docs check lock clean
 
 help: ## list the targets
 	@echo "make TARGET [ARGS='...'] [PYTHON=python3.x]"
@@ -28,17 +28,14 @@ campaign: install ## run the paper's campaign: harness campaign campaigns/paper_
 quick: install ## the same campaign with a budget of minutes: every stage, fewer steps
 	$(BIN)/harness campaign $(CAMPAIGN) --quick $(ARGS) || test $$? -eq 3
 
-test: install ## run the tests that each change must pass; `make test ARGS="-k payoff"` runs some
-	$(PYTEST) -m "not release" $(ARGS)
+test: install ## run the tests that each change must pass; `make test ARGS="-k payoff"` runs some of them
+	$(PYTEST) -m "not slow" $(ARGS)
 
-test-release: install ## run every test, also those that try promises at their full number: before a release
+test-release: install ## run every test, in about 15 minutes on two cores: before a release, and what a change is about
 	$(PYTEST) $(ARGS)
 
 test-esmini: install ## run the tests with esmini and its maps: make test-esmini ESMINI=/path/to/bin/esmini
 	HARNESS_REQUIRE_ESMINI=1 ESMINI="$(ESMINI)" $(BIN)/pytest -n 0 -m esmini tests/export tests/cli $(ARGS)
-
-test-fast: install ## run the tests of every room that take a moment, in about a minute: after each edit
-	$(PYTEST) -m "not slow and not release" $(ARGS)
 
 wheel: install ## test the wheel in an environment of its own, with the locked versions: make wheel PYTHON=python3.13
 	rm -rf build/wheel && $(PYTHON) -m venv build/wheel/venv

@@ -17,7 +17,7 @@ from harness.game.state import Bodies, State
 from harness.game.world import World
 from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.forked_command import remember_environment
-from tests.support.repository import LISTS_OF_TESTS, REPOSITORY, listed_tests
+from tests.support.repository import REPOSITORY, slow_tests
 from tests.support.roads import nearest_station_m
 from tests.support.scenes import build_scene, run_sumo_program
 from tests.support.shared import shared_folder
@@ -44,13 +44,12 @@ def pytest_collection() -> Generator[None, object, object]:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the tests of tests/slow_tests.txt as slow, and those of tests/release_tests.txt as release."""
-    for mark in LISTS_OF_TESTS:
-        listed = listed_tests(mark)
-        for item in items:
-            test = item.nodeid.partition("[")[0]
-            if test in listed or test.partition("::")[0] in listed:
-                item.add_marker(mark)
+    """Mark the tests of tests/slow_tests.txt as slow."""
+    slow = slow_tests()
+    for item in items:
+        test = item.nodeid.partition("[")[0]
+        if test in slow or test.partition("::")[0] in slow:
+            item.add_marker(pytest.mark.slow)
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.repository import LISTS_OF_TESTS, PACKAGE, REPOSITORY, SOURCES, label, listed_tests, tree_of
+from tests.support.repository import PACKAGE, REPOSITORY, SOURCES, label, slow_tests, tree_of
 
 # Which room may import which others, from the lowest floor to the highest. A room is a module or folder directly under
 # harness/, or a folder in one that has a line of its own. A new arrow is a decision: add it here first.
@@ -254,15 +254,14 @@ def test_tests__no_test_module_imports_another() -> None:
     assert wrong == []
 
 
-def test_lists_of_tests__each_line_names_a_test_and_every_room_keeps_fast_ones() -> None:
-    """Of the files that say what `make test-fast` and `make test` leave out."""
+def test_slow_tests__each_line_names_a_test_and_every_room_keeps_fast_ones() -> None:
+    """Of tests/slow_tests.txt, which says what `make test` leaves out."""
     tests = {path: names for path in TESTS if path.stem.startswith("test_") and (names := set(functions_of(path)))}
     known = {label(path) for path in tests} | {
         f"{label(path)}::{name}" for path, names in tests.items() for name in names
     }
-    listed = {test for mark in LISTS_OF_TESTS for test in listed_tests(mark)}
-    assert sorted(listed - known) == []
-    fast = {path for path, names in tests.items() if label(path) not in listed and names - named_in(path, listed)}
+    assert sorted(slow_tests() - known) == []
+    fast = {path for path, names in tests.items() if label(path) not in slow_tests() and names - slow_in(path)}
     folders = {path.relative_to(REPOSITORY / "tests").parts[0] for path in fast}
     modules = {"library", "errors", "files", "version", "shipped_documents", "harness", "__main__"}
     assert {room.split(".")[0] for room in ROOMS} - modules <= folders
@@ -272,8 +271,8 @@ def functions_of(path: Path) -> list[str]:
     return [node.name for node in tree_of(path).body if isinstance(node, ast.FunctionDef) and node.name[:5] == "test_"]
 
 
-def named_in(path: Path, listed: set[str]) -> set[str]:
-    return {line.partition("::")[2] for line in listed if line.startswith(f"{label(path)}::")}
+def slow_in(path: Path) -> set[str]:
+    return {line.partition("::")[2] for line in slow_tests() if line.startswith(f"{label(path)}::")}
 
 
 # --- names, docstrings, length ---

@@ -32,8 +32,6 @@ from tests.support.tiny import (
     write_campaign,
 )
 
-pytestmark = pytest.mark.slow
-
 ARMS = ("naive_alone", "naive_vs_sumo", "speedy_alone", "naive_vs_speedy", "retrained_vs_speedy")
 ARMS += ("retrained_alone_speedy",)
 TRAININGS = ("naive", "speedy", "retrained_speedy")
@@ -153,6 +151,7 @@ def test_campaign__sumo_plays_a_replay_as_it_was_recorded(run: Path, tmp_path: P
 # --- again, and with changes ------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_campaign__running_again_skips_everything(run: Path, tmp_path: Path) -> None:
     again = shutil.copytree(run, tmp_path / "run")
     before = files_in(again)
@@ -160,6 +159,7 @@ def test_campaign__running_again_skips_everything(run: Path, tmp_path: Path) -> 
     assert files_in(again) == before
 
 
+@pytest.mark.slow
 def test_campaign__more_episodes_keep_the_trainings_and_the_games_that_were_played(tmp_path: Path) -> None:
     again = shutil.copytree(sumo_run(), tmp_path / "run")
     more = {**BY_SUMO, "assessment": {"episodes": 3}}
@@ -168,6 +168,7 @@ def test_campaign__more_episodes_keep_the_trainings_and_the_games_that_were_play
     pd.testing.assert_frame_equal(after[after["episode"] < 2].reset_index(drop=True), before)
 
 
+@pytest.mark.slow
 def test_campaign__an_ego_that_is_a_policy_drives_as_where_it_was_trained(
     run: Path, episodes: pd.DataFrame, tmp_path: Path
 ) -> None:

@@ -333,7 +333,7 @@ ONE_IN = 8
 def all_at_release(rows: Sequence[Bad]) -> list[Any]:
     """A case for each row: `make test` tries one in `ONE_IN` of them, `make test-release` all."""
     return [
-        pytest.param(row, id=repr(row), marks=[pytest.mark.release] if k % ONE_IN else []) for k, row in enumerate(rows)
+        pytest.param(row, id=repr(row), marks=[pytest.mark.slow] if k % ONE_IN else []) for k, row in enumerate(rows)
     ]
 
 

@@ -9,13 +9,13 @@ from pathlib import Path
 REPOSITORY = Path(__file__).resolve().parents[2]
 """The top level: `harness/`, `networks/`, `personas/` and `campaigns/` are in it."""
 
-LISTS_OF_TESTS = ("slow", "release")
-"""`tests/slow_tests.txt` has one test (`file::function`) or test file on a line; `#` begins a comment."""
+SLOW_TESTS = REPOSITORY / "tests" / "slow_tests.txt"
+"""One test (`file::function`) or test file on a line; `#` begins a comment."""
 
 
-def listed_tests(mark: str) -> set[str]:
-    """The lines of the list of this mark, without comments."""
-    lines = (REPOSITORY / "tests" / f"{mark}_tests.txt").read_text(encoding="utf-8").splitlines()
+def slow_tests() -> set[str]:
+    """The lines of SLOW_TESTS without comments."""
+    lines = SLOW_TESTS.read_text(encoding="utf-8").splitlines()
     return {line.partition("#")[0].strip() for line in lines} - {""}
 
 
