@@ -175,7 +175,8 @@ def serve(descriptor: int) -> None:
             *streams, answer = descriptors
             pid = os.fork()
             if pid == 0:
-                _carry_out(*json.loads(request), streams)
+                command, folder, environment = json.loads(request)
+                _carry_out(command, folder, environment, streams)
             for each in streams:
                 os.close(each)
             os.write(answer, pid.to_bytes(8, "little"))
