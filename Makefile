@@ -31,7 +31,7 @@ quick: install ## the same campaign with a budget of minutes: every stage, fewer
 test: install ## run the tests that each change must pass; `make test ARGS="-k payoff"` runs some of them
 	$(PYTEST) -m "not slow" $(ARGS)
 
-test-release: install ## run every test, in about 15 minutes on two cores: before a release, and what a change is about
+test-release: install ## run every test: before a release; ARGS names those of what a change is about
 	$(PYTEST) $(ARGS)
 
 test-esmini: install ## run the tests with esmini and its maps: make test-esmini ESMINI=/path/to/bin/esmini

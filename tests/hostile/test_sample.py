@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import resource
 import shutil
 import subprocess
 from pathlib import Path
@@ -26,6 +25,7 @@ from tests.hostile.inputs import (
 )
 from tests.support.processes import in_session
 from tests.support.tiny import HARNESS, PATIENCE_S
+from tests.support.work import children_s
 
 TABLES = {
     "campaign": CAMPAIGNS,
@@ -74,7 +74,7 @@ def test_command__refuses_a_bad_input_and_leaves_nothing_behind(bad: Bad, tmp_pa
         (tmp_path / name).mkdir()
     before = traces_of(tmp_path)
     verb, named, *more = ("campaign", *bad.command[1:]) if bad.command == CHECK else bad.command
-    worked = _cpu_s()
+    worked = children_s()
     command = subprocess.Popen(
         [HARNESS, verb, project / named, *more],
         cwd=tmp_path / "here",
@@ -89,14 +89,9 @@ def test_command__refuses_a_bad_input_and_leaves_nothing_behind(bad: Bad, tmp_pa
     finally:
         left = in_session(command.pid)
         command.kill()
-    assert_refused(Said(command.returncode, out, err, 0.0, _cpu_s() - worked), bad.words)
+    assert_refused(Said(command.returncode, out, err, 0.0, children_s() - worked), bad.words)
     assert left == []
     assert traces_of(tmp_path) == before
-
-
-def _cpu_s() -> float:
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
 
 
 def test_inputs__that_were_tried_are_many_and_each_another(tmp_path: Path) -> None:

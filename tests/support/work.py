@@ -20,11 +20,12 @@ def assert_work(took_s: float, most_s: float) -> None:
 @cache
 def slowness() -> float:
     """How much longer than on an ordinary machine work takes here: 1 at least."""
-    before = _children_s()
+    before = children_s()
     subprocess.run([sys.executable, "-c", "import torch"], check=True, timeout=600.0)
-    return max(1.0, (_children_s() - before) / IMPORT_S)
+    return max(1.0, (children_s() - before) / IMPORT_S)
 
 
-def _children_s() -> float:
+def children_s() -> float:
+    """The processor time of the processes that this one has started and that have ended."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
