@@ -21,6 +21,7 @@ from sumolib.net.edge import Edge
 from benchmarks.lane_followers import touches
 from harness.errors import UsageError
 from harness.road.net import network
+from harness.road.net.lane_route import LaneRoute
 from harness.road.net.net_file import check_net
 from harness.road.net.route_table import route_table
 
@@ -64,7 +65,7 @@ def survey(file: Path, most: int | None = None, routes: int = _ROUTES) -> Survey
     crashed = ""
     try:
         for edges in routes_through(net, routes)[:routes]:
-            route_table(net, area, edges, goal=edges[-1], goal_position_m=0.0)
+            route_table(net, area, LaneRoute(edges), goal=edges[-1], goal_position_m=0.0)
     except Exception:
         crashed = _last_line()
     paths, phantom = touches(net, rails, most)

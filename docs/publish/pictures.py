@@ -30,6 +30,8 @@ SCENES = (
     "red_light",
     "roundabout",
     "on_ramp",
+    "cut_in",
+    "cut_out",
     "brake",
     "crossing",
     "zebra",

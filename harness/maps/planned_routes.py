@@ -17,6 +17,7 @@ from sumolib.net.lane import Lane
 from harness.game.arrays import FloatArray
 from harness.game.road import SPACING_M
 from harness.maps.candidates import Candidate, LaneWay, for_cars
+from harness.road.net.lane_route import LaneRoute
 from harness.road.net.network import lane_line
 from harness.road.net.route_table import route_line
 
@@ -85,7 +86,7 @@ def following_m(limit_mps: float) -> float:
 def _with_goal(net: Net, edges: Sequence[Edge], place: int) -> PlannedRoute | None:
     """The route along edges whose junction is behind the one in `place`, with its goal."""
     try:
-        points, starts = route_line(net, edges)
+        points, starts = route_line(net, LaneRoute(edges))
     except ValueError:
         return None
     length_m = float(_stations(points)[-1])

@@ -23,6 +23,7 @@ from harness.game.geometry import Box
 from harness.game.rails import Rails
 from harness.game.road import MARGIN_M, SPACING_M, Route
 from harness.road.net import network, surface
+from harness.road.net.lane_route import LaneRoute
 from harness.road.net.route_table import route_table
 from harness.road.net.surface import Part
 from harness.road.scene.open_scene import OpenScene
@@ -94,13 +95,13 @@ class Read:
     @cached_property
     def tables(self) -> list[Route]:
         return [
-            route_table(self.net, self.area, edges, goal=edges[-1], goal_position_m=1.0)
+            route_table(self.net, self.area, LaneRoute(edges), goal=edges[-1], goal_position_m=1.0)
             for edges in routes_through(self.net, 8)
         ]
 
     def table(self, *names: str, goal_position_m: float = 1.0) -> Route:
         edges = [self.net.getEdge(name) for name in names]
-        return route_table(self.net, self.area, edges, goal=edges[-1], goal_position_m=goal_position_m)
+        return route_table(self.net, self.area, LaneRoute(edges), goal=edges[-1], goal_position_m=goal_position_m)
 
 
 @pytest.fixture(scope="module")

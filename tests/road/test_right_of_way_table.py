@@ -19,6 +19,7 @@ from harness.game.geometry import Box, box_distance
 from harness.game.junctions import SAMPLE, Conflicts, Control, RightOfWay
 from harness.game.roles import EGO, NON_EGO
 from harness.road.net import network
+from harness.road.net.lane_route import LaneRoute
 from harness.road.net.right_of_way_table import right_of_way
 from harness.road.net.stream import Feeders, Stream, carries_traffic
 from harness.road.scene.open_scene import open_scene
@@ -49,7 +50,7 @@ def crossings(build_net: Build) -> dict[str, Net]:
 
 def of(net: Net, *routes: str) -> RightOfWay:
     """The right of way of players with these routes, each a list of edges."""
-    return right_of_way(net, [[net.getEdge(name) for name in route.split()] for route in routes])
+    return right_of_way(net, [LaneRoute([net.getEdge(name) for name in route.split()]) for route in routes])
 
 
 def conflict(net: Net, route: str, stream: str) -> dict[str, Any] | None:

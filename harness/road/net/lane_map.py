@@ -9,9 +9,8 @@ from sumolib.net.edge import Edge
 from sumolib.net.lane import Lane
 
 from harness.game.cartesian_view import MapLane, MapSignal
+from harness.road.net.lane_route import LaneRoute
 from harness.road.net.network import edges_near, inner_lanes, lane_line
-from harness.road.net.own_lanes import LanesOf
-from harness.road.net.route_table import junctions_on_route
 
 _CLASSES = ("passenger", "bicycle", "pedestrian")
 _INSIDE = ("internal", "connector")  # functions of the edges with a junction's lanes
@@ -59,11 +58,10 @@ def _is_left(lane: Lane, other: Lane) -> bool:
     return bool(along[0] * across[1] - along[1] * across[0] > 0.0)
 
 
-def lanes_on_route(net: Net, edges: Sequence[Edge], lanes_of: LanesOf) -> tuple[str, ...]:
-    """The lanes that the line of a route along edges follows, with those inside junctions, in order."""
-    links = [junction.link for junction in junctions_on_route(net, edges, lanes_of)]
-    lanes = [] if links else [lanes_of(edges[0])[-1]]
-    for link in links:
+def lanes_on_route(net: Net, route: LaneRoute) -> tuple[str, ...]:
+    """The lanes that the line of a route follows, with those inside junctions, in order."""
+    lanes = [route.entries[0]]
+    for link in route.links:
         lanes += [link.getFromLane(), *inner_lanes(net, link), link.getToLane()]
     return tuple(dict.fromkeys(lane.getID() for lane in lanes))
 

@@ -12,14 +12,13 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 from sumolib.net import Net
 from sumolib.net.connection import Connection
-from sumolib.net.edge import Edge
 from sumolib.net.lane import Lane
 from sumolib.net.node import Node
 
 from harness.game.arrays import FloatArray
 from harness.game.junctions import Conflicts, Control, RightOfWay, StopLines, Streams
-from harness.road.net.network import car_lanes, lane_line
-from harness.road.net.own_lanes import LanesOf
+from harness.road.net.lane_route import LaneRoute
+from harness.road.net.network import lane_line
 from harness.road.net.route_table import JunctionOnRoute, junctions_on_route
 from harness.road.net.stream import Feeders, Stream, carries_traffic
 
@@ -32,11 +31,10 @@ _CONTROL = {"m": Control.GIVE_WAY, "=": Control.GIVE_WAY, "s": Control.STOP, "w"
 _MAJOR = "MO"  # states of links with the right of way
 
 
-def right_of_way(net: Net, routes: Sequence[Sequence[Edge]], lanes_of: Sequence[LanesOf] | None = None) -> RightOfWay:
-    """Conflicts and stop lines of players with routes along connected edges, in the order of the players. The route of
-    a player on foot has no edges. `lanes_of` are the lanes that each player may use; None: those of cars."""
-    users = lanes_of or [car_lanes] * len(routes)
-    return _Builder(net).build([junctions_on_route(net, *each) for each in zip(routes, users, strict=True)])
+def right_of_way(net: Net, routes: Sequence[LaneRoute]) -> RightOfWay:
+    """Conflicts and stop lines of players with routes, in the order of the players. That of a player on foot has no
+    edges."""
+    return _Builder(net).build([junctions_on_route(net, each) for each in routes])
 
 
 def _control_of(link: Connection) -> Control:

@@ -20,8 +20,9 @@ from sumolib.net.lane import Lane
 from harness.config.road_user import WALKING_MPS
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.road import MARGIN_M, SPACING_M, Route
-from harness.road.net.network import car_lanes, connection_lines, inner_lanes, lane_line
-from harness.road.net.own_lanes import LanesOf, own_side
+from harness.road.net.lane_route import LaneRoute
+from harness.road.net.network import connection_lines, inner_lanes, lane_line
+from harness.road.net.own_lanes import own_side
 
 _FAR_SIDE_M = 50.0
 _ON_POINT_M = 0.1
@@ -57,24 +58,23 @@ class Meeting:
     other_m: float
 
 
-def junctions_on_route(net: Net, edges: Sequence[Edge], lanes_of: LanesOf = car_lanes) -> list[JunctionOnRoute]:
-    """The junctions of a route along connected edges, in order, with the stations of its table. `lanes_of` are the
-    lanes that the player may use."""
-    if len(edges) < 2:
+def junctions_on_route(net: Net, route: LaneRoute) -> list[JunctionOnRoute]:
+    """The junctions of a route, in order, with the stations of its table."""
+    if len(route.edges) < 2:
         return []
-    _, starts = route_line(net, edges, lanes_of)
+    _, starts = route_line(net, route)
     return [
-        JunctionOnRoute(link=link, links=_links_between(edges[k], edges[k + 1], lanes_of), begin_m=starts[2 * k + 1])
-        for k, link in enumerate(_links(edges, lanes_of))
+        JunctionOnRoute(link=link, links=route.links_after(k), begin_m=starts[2 * k + 1])
+        for k, link in enumerate(route.links)
     ]
 
 
-def route_line(net: Net, edges: Sequence[Edge], lanes_of: LanesOf = car_lanes) -> tuple[FloatArray, list[float]]:
+def route_line(net: Net, route: LaneRoute) -> tuple[FloatArray, list[float]]:
     """[n, 2] the line of a route's table, and the stations of the starts of its edges and of the junctions between.
 
     Raises ValueError if consecutive edges are not connected.
     """
-    points, starts = _join(_lines(net, edges, _links(edges, lanes_of), lanes_of))
+    points, starts = _join(_lines(net, route))
     return points, starts.tolist()
 
 
@@ -83,29 +83,20 @@ def line_over_junction(net: Net, link: Connection) -> FloatArray:
     return _join(connection_lines(net, link))[0]
 
 
-def route_table(
-    net: Net,
-    area: BaseGeometry,
-    edges: Sequence[Edge],
-    *,
-    goal: Edge,
-    goal_position_m: float,
-    lanes_of: LanesOf = car_lanes,
-) -> Route:
-    """The table of a route along connected edges; `area` is the net's drivable area, `lanes_of` are the lanes that the
-    player may use.
+def route_table(net: Net, area: BaseGeometry, route: LaneRoute, *, goal: Edge, goal_position_m: float) -> Route:
+    """The table of a route; `area` is the net's drivable area.
 
     Raises ValueError if consecutive edges are not connected or the goal's edge is not on the route.
     """
-    if goal not in edges:
+    if goal not in route.edges:
         raise ValueError(f"does not pass the goal's edge {goal.getID()!r}")
-    pieces = _pieces(net, edges, lanes_of)
+    pieces = _pieces(net, route)
     points, starts = _join([piece.line for piece in pieces])
     line = shapely.LineString(points)
     stations, inside, points, headings = _sampled(line)
     piece_at = np.clip(np.searchsorted(starts, stations, side="right") - 1, 0, len(pieces) - 1)
 
-    ends = _lane_ends(edges, lanes_of, [starts[2 * k] + _length(pieces[2 * k].line) for k in range(len(edges))])
+    ends = route.lane_ends([start + _length(piece.line) for start, piece in zip(starts[::2], pieces[::2], strict=True)])
     most = max(len(piece.lanes) for piece in pieces)
     offsets = np.full((len(stations), most), np.nan)
     lane_ends = np.full((len(stations), most), np.inf)
@@ -118,7 +109,7 @@ def route_table(
     widths = np.array([max((lane.getWidth() for _, lane in piece.lanes), default=0.0) for piece in pieces])[piece_at]
     on_edge = ~np.array([piece.is_junction for piece in pieces])[piece_at]
     own_left, own_right = own_side(net, points, headings, offsets_m=offsets, width_m=widths, on_edge=on_edge)
-    row = 2 * list(edges).index(goal)
+    row = 2 * list(route.edges).index(goal)
     return Route(
         x_m=points[:, 0],
         y_m=points[:, 1],
@@ -161,62 +152,26 @@ def way_table(way: FloatArray, area: BaseGeometry) -> Route:
 # --- the line --------------------------------------------------------------------------------------------------------
 
 
-def _lines(net: Net, edges: Sequence[Edge], links: Sequence[Connection], lanes_of: LanesOf) -> list[FloatArray]:
-    """The sections [n, 2] of the line of a route with these connections: over an edge, over its junction, and so on."""
-    entries = _entries(edges, links, lanes_of)
+def _lines(net: Net, route: LaneRoute) -> list[FloatArray]:
+    """The sections [n, 2] of a route's line: over an edge, over its junction, and so on."""
     lines = []
-    for entry, link in zip(entries, links, strict=False):
+    for entry, link in zip(route.entries, route.links, strict=False):
         lines += [_between(entry, link.getFromLane()), line_over_junction(net, link)]
-    return [*lines, lane_line(entries[-1])]
+    return [*lines, lane_line(route.entries[-1])]
 
 
-def _entries(edges: Sequence[Edge], links: Sequence[Connection], lanes_of: LanesOf) -> list[Lane]:
-    """The lane at the start of each edge of a route."""
-    first = links[0].getFromLane() if links else lanes_of(edges[0])[-1]
-    return [first, *(link.getToLane() for link in links)]
-
-
-def _pieces(net: Net, edges: Sequence[Edge], lanes_of: LanesOf) -> list[_Piece]:
-    links = _links(edges, lanes_of)
-    entries, lines = _entries(edges, links, lanes_of), _lines(net, edges, links, lanes_of)
+def _pieces(net: Net, route: LaneRoute) -> list[_Piece]:
+    lines, links = _lines(net, route), route.links
     pieces = []
-    for k, edge in enumerate(edges):
-        lanes = [(lane_line(lane), lane) for lane in lanes_of(edge)]
-        pieces.append(_Piece(line=lines[2 * k], lanes=lanes, edge=k, speed_mps=entries[k].getSpeed()))
+    for k, edge in enumerate(route.edges):
+        lanes = [(lane_line(lane), lane) for lane in route.lanes_of(edge)]
+        pieces.append(_Piece(line=lines[2 * k], lanes=lanes, edge=k, speed_mps=route.entries[k].getSpeed()))
         if k < len(links):
-            between = _links_between(edge, edges[k + 1], lanes_of)
-            lanes = [(line_over_junction(net, link), link.getToLane()) for link in between]
+            lanes = [(line_over_junction(net, link), link.getToLane()) for link in route.links_after(k)]
             speed_mps = [*inner_lanes(net, links[k]), links[k].getToLane()][0].getSpeed()
             over = lines[2 * k + 1]
             pieces.append(_Piece(line=over, lanes=lanes, edge=k + 1, speed_mps=speed_mps, is_junction=True))
     return pieces
-
-
-def _links_between(edge: Edge, following: Edge, lanes_of: LanesOf) -> list[Connection]:
-    starts, ends = lanes_of(edge), lanes_of(following)
-    return [
-        link for link in edge.getConnections(following) if link.getFromLane() in starts and link.getToLane() in ends
-    ]
-
-
-def _links(edges: Sequence[Edge], lanes_of: LanesOf) -> list[Connection]:
-    """The connections of a route, one between each two edges: the leftmost ones that lead to its end.
-
-    A greedy search from the end of the route keeps the number of lane changes small.
-    """
-    chosen: list[Connection] = []
-    target = (lanes_of(edges[-1]) or edges[-1].getLanes())[-1]
-    for edge, following in zip(reversed(edges[:-1]), reversed(edges[1:]), strict=True):
-        links = _links_between(edge, following, lanes_of)
-        if not links:
-            raise ValueError(f"has no connection from edge {edge.getID()!r} to {following.getID()!r}")
-        best = min(
-            links,
-            key=lambda link: (abs(link.getToLane().getIndex() - target.getIndex()), -link.getFromLane().getIndex()),
-        )
-        chosen.insert(0, best)
-        target = best.getFromLane()
-    return chosen
 
 
 def _between(entry: Lane, exit_: Lane) -> FloatArray:
@@ -264,19 +219,6 @@ def _sampled(line: shapely.LineString) -> tuple[FloatArray, BoolArray, FloatArra
 
 
 # --- lanes and road edges --------------------------------------------------------------------------------------------
-
-
-def _lane_ends(edges: Sequence[Edge], lanes_of: LanesOf, end_of_edge_m: Sequence[float]) -> list[dict[str, float]]:
-    """For each edge of the route: the station where each lane stops leading along the route; inf if it never does."""
-    ends = [{lane.getID(): np.inf for lane in lanes_of(edges[-1])}]
-    for k in reversed(range(len(edges) - 1)):
-        links, following = _links_between(edges[k], edges[k + 1], lanes_of), ends[0]
-        lane_ends = {}
-        for lane in lanes_of(edges[k]):
-            reached = [following[link.getToLane().getID()] for link in links if link.getFromLane() is lane]
-            lane_ends[lane.getID()] = max(reached, default=end_of_edge_m[k])
-        ends.insert(0, lane_ends)
-    return ends
 
 
 def _offsets(points: FloatArray, headings: FloatArray, lane_points: FloatArray) -> FloatArray:

@@ -15,7 +15,7 @@ from harness.game.road import MARGIN_M, SPACING_M
 from harness.game.world import World
 from harness.road.net.lane_map import lane_map, lanes_on_route, signals_on_route
 from harness.road.net.network import read_net
-from harness.road.net.own_lanes import lanes_for
+from harness.road.scene.open_player import lane_route
 
 CartesianRoads: TypeAlias = tuple[CartesianRoad, ...]
 """[P] the road of each player."""
@@ -40,7 +40,7 @@ def cartesian_roads(
                 lanes=lanes,
                 rails=() if on_foot else tuple(rail_lines),
                 route_edges=() if on_foot else tuple(edges[player]),
-                route_lanes=() if on_foot else lanes_on_route(net, route, lanes_for(document.players[player].kind)),
+                route_lanes=() if on_foot else lanes_on_route(net, lane_route(net, document.players[player], route)),
                 route_line=line,
                 goal_m=goal_m,
                 goal_x_m=float(np.interp(goal_m, along_m, line[:, 0])),

@@ -21,6 +21,7 @@ from harness.game.road import Route
 from harness.road.demand.departures import edges_of
 from harness.road.demand.route_file import Departure, RouteFile, VehicleType
 from harness.road.net import network
+from harness.road.net.lane_route import LaneRoute
 from harness.road.net.own_lanes import bicycle_lanes, lanes_for
 from harness.road.net.route_table import route_table
 from harness.road.scene.scene_files import SceneFiles
@@ -69,13 +70,18 @@ def open_player(role: str, files: SceneFiles, area: BaseGeometry) -> OpenPlayer:
     _check_kind(routes, player, vehicle, edges)
     goal_position_m = document.goal_of(player)[1].position_m
     try:
-        lanes_of = lanes_for(player.kind)
-        route = route_table(net, area, edges, goal=goal, goal_position_m=goal_position_m, lanes_of=lanes_of)
+        route = route_table(net, area, lane_route(net, player, edges), goal=goal, goal_position_m=goal_position_m)
     except ValueError as error:
         raise UsageError.of(routes.path, key, f"its route {error}", "correct the route's edges") from None
     vehicle_type = routes.types[vehicle.vehicle_type]
     _check_room_beyond_goal(file, document, player=player, route=route, vehicle_type=vehicle_type)
     return OpenPlayer(route=route, edges=tuple(edge.getID() for edge in edges), vehicle_type=vehicle_type)
+
+
+def lane_route(net: Net, player: Player, edges: Sequence[Edge]) -> LaneRoute:
+    """The lanes of a player's route along edges, from its start on."""
+    start = net.getLane(player.lane) if player.lane else None
+    return LaneRoute(edges, lanes_of=lanes_for(player.kind), start=start)
 
 
 def _check_kind(routes: RouteFile, player: Player, vehicle: Departure, edges: Sequence[Edge]) -> None:

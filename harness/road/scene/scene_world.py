@@ -17,14 +17,14 @@ from harness.game.road import Road, Routes
 from harness.game.start_range import StartRange
 from harness.game.world import World
 from harness.road.demand.departures import background_departures, check_departures, edges_of
+from harness.road.net.lane_route import LaneRoute
 from harness.road.net.levels import check_one_level
 from harness.road.net.network import rails
-from harness.road.net.own_lanes import lanes_for
 from harness.road.net.right_of_way_table import right_of_way
 from harness.road.net.walker_conflicts import with_walkers_conflicts
 from harness.road.scene.footway import Ground, open_walker
 from harness.road.scene.open_obstacles import hiding_in
-from harness.road.scene.open_player import OpenPlayer, actuator_limits, open_player
+from harness.road.scene.open_player import OpenPlayer, actuator_limits, lane_route, open_player
 from harness.road.scene.scene_files import SceneFiles
 from harness.road.scene.start_ranges import start_range
 
@@ -93,11 +93,11 @@ def world_of(
     document, net = files.document, files.net
     walking = tuple(player.on_foot for player in document.players)
     routes, types = [player.route for player in players], [player.vehicle_type for player in players]
-    edges = [
-        [] if on_foot else [net.getEdge(name) for name in player.edges]
-        for player, on_foot in zip(players, walking, strict=True)
+    lanes = [
+        LaneRoute([]) if each.on_foot else lane_route(net, each, [net.getEdge(name) for name in player.edges])
+        for player, each in zip(players, document.players, strict=True)
     ]
-    rules = right_of_way(net, edges, [lanes_for(player.kind) for player in document.players])
+    rules = right_of_way(net, lanes)
     return World(
         road=Road(
             rails(rail_lines, REACH_M + 10.0),
