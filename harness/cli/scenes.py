@@ -198,6 +198,39 @@ def new_scene(
             _write(opened, chosen, out, console)
 
 
+@scene_app.command("vary")
+def vary_scene(
+    path: Annotated[
+        Path, typer.Argument(metavar="SCENE", help="A scene's folder or scene.toml, or the name of a shipped scene.")
+    ],
+    roads: Annotated[int, typer.Option(min=1, max=1000, metavar="N", help="Number of roads.")] = 10,
+    seed: Annotated[
+        int, typer.Option(min=0, metavar="K", help="Seed of the first road; the others have the seeds after it.")
+    ] = 1,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder that gets a scene for each road.")] = Path(),
+) -> None:
+    """Make variants of a scene on other roads: is an ego that learned on one road able to drive another?
+
+    Each road has other lengths, lane widths, speed limits, bends and angles between roads, drawn by its seed. Players,
+    traffic and right of way are those of the scene. A road that a rule-based driver can't drive is drawn again.
+    """
+    from harness.cli.scene_varying import check_free, words_of, write_variant
+    from harness.road.scene.open_scene import open_scene
+
+    scene, seeds = open_scene(folder_of_scene(document_at(path, "networks")) or path), range(seed, seed + roads)
+    if not out.is_dir():
+        raise UsageError.of("--out", str(out), *messages.no_folder(out))
+    check_free(scene, seeds, out)
+    console, folders = console_of_any_encoding(), []
+    for each in seeds:
+        with console.status(f"road {each}: making and driving it"):
+            written = write_variant(scene, each, out)
+        folders.append(str(written.folder))
+        again = f" ({len(written.discarded)} drawn before can't be driven)" if written.discarded else ""
+        print_plain([f"wrote {written.folder}: {words_of(written.variation)}{again}"], console)
+    print_plain([f"Next: harness league --ego EGO --scenes {','.join(folders)}"], console)
+
+
 def _wanted(opened: OpenMap, kind: str | None, near: str | None, within_m: float) -> list[GamePlan]:
     plans = opened.near(near, within_m)
     if near is not None and not plans:

@@ -32,7 +32,7 @@ def cartesian_roads(
     roads = []
     for player, route in enumerate(routes):
         on_foot, rows = document.players[player].on_foot, signal_lines(world, player)
-        line, goal_m = _route_line(world, player), float(world.road.routes.goal_m[player])
+        line, goal_m = route_line_of(world, player), float(world.road.routes.goal_m[player])
         along_m = SPACING_M * np.arange(len(line))
         roads.append(
             CartesianRoad(
@@ -51,7 +51,7 @@ def cartesian_roads(
     return tuple(roads)
 
 
-def _route_line(world: World, player: int) -> FloatArray:
+def route_line_of(world: World, player: int) -> FloatArray:
     """[n, 2] the points of a player's route in its table, without the straight extensions before and after it."""
     table, beyond = world.road.routes, round(MARGIN_M / SPACING_M)
     rows = slice(table.first_row[player] + beyond, table.last_row[player] + 1 - beyond)

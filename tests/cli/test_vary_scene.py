@@ -1,0 +1,48 @@
+"""`harness scene vary`: the same scene on other roads."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from harness.cli.app import app
+from harness.errors import UsageError
+from harness.road.scene.open_scene import open_scene
+from tests.support.tiny import PAPER_MERGE
+
+
+def vary(*arguments: object) -> list[str]:
+    result = CliRunner().invoke(app, ["scene", "vary", *map(str, arguments)])
+    if result.exception is not None:
+        raise result.exception
+    return result.output.splitlines()
+
+
+def test_vary__writes_a_scene_that_is_in_order_and_says_how_its_road_differs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "300")
+    wrote, then = vary(PAPER_MERGE, "--roads", 1, "--seed", 5, "--out", tmp_path)
+    folder = tmp_path / "paper_merge_road5"
+    assert wrote.startswith(f"wrote {folder}: lengths × ")
+    assert then == f"Next: harness league --ego EGO --scenes {folder}"
+    original, varied = open_scene(PAPER_MERGE), open_scene(folder)
+    assert varied.document.name == "paper_merge_road5"
+    stretch = float(wrote.split("lengths × ")[1].split(",")[0])
+    routes, before = varied.world.road.routes, original.world.road.routes
+    assert routes.goal_m / before.goal_m == pytest.approx([stretch, stretch], abs=0.02)
+    assert original.document.ego.position_m is not None
+    assert varied.document.ego.position_m == pytest.approx(
+        [stretch * m for m in original.document.ego.position_m], rel=0.02
+    )
+    assert [each.name for each in folder.parent.iterdir()] == [folder.name], "nothing is left beside the scene"
+
+    with pytest.raises(UsageError, match="is there already, and nothing is overwritten"):
+        vary(PAPER_MERGE, "--roads", 2, "--seed", 4, "--out", tmp_path)
+
+
+def test_vary__into_a_folder_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="--out"):
+        vary(PAPER_MERGE, "--out", tmp_path / "nowhere")
