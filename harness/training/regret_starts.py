@@ -83,7 +83,7 @@ def scores_of(payoffs: FloatArray, failed: BoolArray) -> RegretScores:
     starts = payoffs.shape[1]
     return RegretScores(
         best_payoffs=payoffs.max(axis=0).tolist(),
-        preventable=[not by_all for by_all in failed.all(axis=0)],
+        preventable=[not of_start.all() for of_start in failed.T],
         latest_payoffs=[None] * starts,
         last_replays=[0] * starts,
     )
