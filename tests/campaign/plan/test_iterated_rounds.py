@@ -336,6 +336,6 @@ def test_campaign__names_without_a_meaning_are_refused(
     both = [str(write_persona(tmp_path, name)) for name in BOTH]
     shutil.copy(REPOSITORY / "egos" / "adas.toml", tmp_path / f"{'x' * 41}.toml")
     with pytest.raises(UsageError) as error:
-        open_campaign(write_campaign(tmp_path, personas=both, **changes))
+        open_campaign(write_campaign(tmp_path, **{"personas": both, **changes}))
     assert key in str(error.value)
     assert words in str(error.value)
