@@ -256,7 +256,7 @@ class Campaign(Document):
         if self.ego.driver == SUMO and self.ego.shield is not None:
             message = "SUMO drives this ego, so that there is no decision to check"
             mistakes.append(("ego.shield", message, "leave out this key, or name another ego.driver"))
-        mistakes += self._perceived_by_sumo()
+        mistakes += [*self._perceived_by_sumo(), *self._without_replays()]
         if self.ego.driver != LEARNED:
             if self.rounds.count > Rounds().count:
                 message = "the ego does not learn, so there are no further rounds"
@@ -278,6 +278,21 @@ class Campaign(Document):
         if self.crossplay is not None and SUMO in self.crossplay.egos:
             message = "SUMO's driver knows what is there: it can't be compared with egos with perception errors"
             return [("crossplay.egos", message, f"leave out {SUMO!r}, or ego.perception")]
+        return []
+
+    def _without_replays(self) -> list[tuple[str, str, str]]:
+        """Mistakes where no start is replayed by regret, though the document asks for it."""
+        key, leave_out = "retraining.starts", "leave out this key"
+        if self.retraining.starts == Retraining().starts:
+            return []
+        if self.ego.driver != LEARNED:
+            message = "an ego that does not learn can't be retrained"
+            return [(key, message, f"{leave_out}, or set ego.driver to 'learned'")]
+        if not self.personas:
+            return [(key, "without personas, no ego is retrained", f"{leave_out}, or name a persona")]
+        if self.retraining.alone_share == 1.0:
+            message = "with retraining.alone_share = 1, no game is played against the non-ego"
+            return [(key, message, f"{leave_out}, or lower retraining.alone_share")]
         return []
 
     def _unused_tables(self) -> list[str]:

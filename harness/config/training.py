@@ -102,6 +102,9 @@ class Retraining(Document):
     """Share of games without the non-ego, so that the ego does not forget what it has learned."""
     warm_start: bool = False
     """Start from the parameters of the naive ego, instead of random ones."""
+    starts: Literal["uniform", "regret"] = "uniform"
+    """Starts of the games against the non-ego. `uniform`: drawn from the scene's ranges. `regret`: half of them are
+    replays of starts in which the ego earns less than a reference driver or the naive ego did."""
     against: list[Name] = Field([], max_length=50)
     """Names of personas. One more ego, `robust`, is retrained against all of them, in equal shares of its games, and
     with a budget multiplied by their number. It is also assessed against the other personas of the campaign, which it

@@ -14,7 +14,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from harness.drivers.policy_file import ACTIONS
 from harness.environments.arena import Arena, LiveSimulation
-from harness.environments.auto_reset import AutoReset
+from harness.environments.auto_reset import AutoReset, Replays
 from harness.environments.single_game import space_of
 from harness.game.arrays import FloatArray
 from harness.game.initial_state import StartDistribution
@@ -96,9 +96,12 @@ class ArenaVecEnv(GamesVecEnv):
         self._finished: list[Finished] = []
         self.sample_from(start_distribution, *parts)
 
-    def sample_from(self, start_distribution: StartDistribution, *parts: str | int) -> None:
-        """Draw the games of the next `reset` and after from `start_distribution` and `parts`."""
-        self._games = AutoReset(self.arena, start_distribution, *parts)
+    def sample_from(
+        self, start_distribution: StartDistribution, *parts: str | int, replays: Replays | None = None
+    ) -> None:
+        """Draw the games of the next `reset` and after from `start_distribution` and `parts`; with `replays`, some are
+        played from other starts instead."""
+        self._games = AutoReset(self.arena, start_distribution, *parts, replays=replays)
         self._payoff = np.zeros(self.num_envs)
 
     def reset(self) -> FloatArray:
@@ -148,6 +151,7 @@ class ArenaVecEnv(GamesVecEnv):
         took_part = state.present[game] | (state.outcome[game] != Outcome.RUNNING)  # a player at its goal has left
         payoff, steps, alone = float(self._payoff[game]), int(state.step[game]), int(took_part.sum()) == 1
         self._finished.append(Finished(payoff=payoff, steps=steps, outcome=outcome, alone=alone))
+        self._games.ended(game, payoff)
         self._payoff[game] = 0.0
 
 

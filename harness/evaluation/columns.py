@@ -240,6 +240,15 @@ _TABLES = {
         _FAILURE_RATE,
         Column("games", COUNT, "Games that ended since the row before."),
         Column("mean_duration_s", NUMBER, "Their mean duration."),
+        Column(
+            "mean_regret",
+            NUMBER,
+            "Mean of max(0, best payoff of the reference drivers and the naive ego - the ego's latest payoff) over the "
+            'preventable starts replayed so far; of trainings with `retraining.starts = "regret"`.',
+            unit="payoff",
+            source="rounds.md",
+            optional=True,
+        ),
         Column("stopped", TEXT, "In the last row of a training: `converged`, `budget` or `did not learn`."),
     ),
     "selections": (PERSONA, SEED, *SELECTIONS),

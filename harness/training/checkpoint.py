@@ -18,6 +18,7 @@ from safetensors.torch import save
 from stable_baselines3 import PPO
 
 from harness.files import write_atomically
+from harness.training.regret_starts import RegretScores
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,6 +31,8 @@ class CurvePoint:
     failure_rate: float
     games: int
     mean_duration_s: float
+    mean_regret: float | None = None
+    """Over the preventable starts that the learner has replayed; None without any."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,6 +50,8 @@ class Progress:
     """Those of them that did not end at the goal."""
     converged_at: int | None = None
     """Steps after which the curve had converged; None: it had not."""
+    regret: RegretScores | None = None
+    """Of a training that replays starts by regret."""
 
 
 def write_checkpoint(model: PPO, progress: Progress, key: str, path: Path) -> None:
@@ -80,7 +85,8 @@ def read_checkpoint(model: PPO, key: str, path: Path) -> Progress | None:
     optimizer = model.policy.optimizer
     optimizer.load_state_dict({**optimizer.state_dict(), "state": moments})
     stored = json.loads(metadata["progress"])
-    return Progress(**{**stored, "curve": [CurvePoint(**window) for window in stored["curve"]]})
+    curve, regret = [CurvePoint(**window) for window in stored["curve"]], stored.get("regret")
+    return Progress(**{**stored, "curve": curve, "regret": RegretScores(**regret) if regret is not None else None})
 
 
 def _digest(tensors: Mapping[str, torch.Tensor], metadata: Mapping[str, str]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
@@ -13,11 +14,39 @@ from harness.drivers.protocol import Driver
 from harness.environments.arena import Arena, Seat
 from harness.environments.seats import seats_of
 from harness.game.arrays import FloatArray, IntArray
-from harness.game.initial_state import draw_initial_state
+from harness.game.initial_state import InitialState, StartDistribution, draw_initial_state
 from harness.game.outcome import Outcome
 from harness.game.roles import EGO
 from harness.game.seeding import generator_of, seed_of
 from harness.road.scene.open_scene import OpenScene
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeededStarts:
+    """The starts of seeded games: start k is the same whoever drives."""
+
+    distribution: StartDistribution
+    parts: tuple[str | int, ...]
+    """They name the random numbers."""
+
+    def start(self, game: int) -> InitialState:
+        """The start of game k."""
+        return draw_initial_state(self.distribution, *self.parts, "game", game)
+
+
+def seeded_starts(
+    scene: OpenScene,
+    persona: Persona,
+    people: Sequence[Mixture | None],
+    alone_share: float,
+    parts: Sequence[str | int],
+) -> SeededStarts:
+    """The starts of an ego of this persona beside the drivers of the non-egos, in `alone_share` of the games without
+    them."""
+    human_factors = [[persona.human_factors], *map(factors_of, people)]
+    shares, present = [[1.0], *map(shares_of, people)], [1.0, *[1.0 - alone_share] * len(people)]
+    distribution = scene.start_distribution(human_factors, present, shares)
+    return SeededStarts(distribution=distribution, parts=tuple(parts))
 
 
 class PairedRollouts:
@@ -43,9 +72,7 @@ class PairedRollouts:
         self._loads = ceil(games / at_once)
         self._tiles = ceil(games / self._loads)
         self._ego = _CurrentDriver()
-        human_factors = [[persona.human_factors], *map(factors_of, people)]
-        shares, present = [[1.0], *map(shares_of, people)], [1.0, *[1.0 - alone_share] * len(people)]
-        self._start_distribution = scene.start_distribution(human_factors, present, shares)
+        self._starts = seeded_starts(scene, persona, people, alone_share, parts)
         seats = [(Seat(self._ego, persona.payoff),), *(seats_of(each, paid=False) for each in people)]
         self._arena = Arena(scene, self._tiles, seats)
 
@@ -66,9 +93,8 @@ class PairedRollouts:
     def _play(self, load: int) -> tuple[FloatArray, FloatArray]:
         arena, scene = self._arena, self._scene
         arena.reload(seed_of(*self._parts, "load", load) % 2**31)
-        parts = {tile: (*self._parts, "game", load * self._tiles + tile) for tile in range(self._tiles)}
-        starts = {tile: draw_initial_state(self._start_distribution, *each) for tile, each in parts.items()}
-        departures = {tile: scene.departures(generator_of(*each, "others")) for tile, each in parts.items()}
+        starts = {tile: self._starts.start(load * self._tiles + tile) for tile in range(self._tiles)}
+        departures = {tile: scene.departures(generator_of(*start.parts, "others")) for tile, start in starts.items()}
         arena.reset(starts, departures if scene.has_background_traffic else {})
         payoff = np.zeros(self._tiles)
         while arena.state.running[:, EGO].any():

@@ -30,6 +30,7 @@ from harness.training.compiled_ppo import CompiledPPO
 from harness.training.early_stopping import Narrowing, has_converged, still_fails
 from harness.training.imitation import imitate
 from harness.training.policy_arrays import layers_of, policy_of, put_policy
+from harness.training.regret_starts import RegretReplays, first_scores, replays_of
 from harness.training.training_games import TrainingSpec, attentive_steps, open_games, sample
 
 CURVE_WINDOW_STEPS = 16_384
@@ -69,7 +70,15 @@ def train(
         model = _learner(spec, environment, tensorboard)
         progress = read_checkpoint(model, key, checkpoint)
         if progress is None:
-            progress = Progress(segments=0, steps=0, segment_payoffs=[], curve=[], alone_games=[], alone_failures=[])
+            progress = Progress(
+                segments=0,
+                steps=0,
+                segment_payoffs=[],
+                curve=[],
+                alone_games=[],
+                alone_failures=[],
+                regret=first_scores(spec),
+            )
             if spec.demonstration_steps:
                 _imitate(spec, model, environment)
         while (stopped := _stop_reason(spec, progress)) is None:
@@ -161,13 +170,15 @@ def _segment(
 ) -> Progress:
     parts = (*spec.parts, "segment", progress.segments)
     set_random_seed(seed_of(*parts, "learner") % 2**32)
-    sample(spec, environment, progress.steps, *parts)
+    replays = replays_of(spec, progress.regret)
+    sample(spec, environment, progress.steps, *parts, replays=replays)
     environment.reload(seed_of(*parts, "sumo") % 2**31)
     narrowing = Narrowing.of(spec.settings, progress.converged_at)
     steps = min(spec.settings.segment_steps, narrowing.end - progress.steps)
     curve = _CurveRecorder(
         environment,
         progress,
+        replays,
         steps=spec.settings.steps,
         step_s=spec.scene.world.step_s,
         largest_deviation=narrowing.largest_deviation,
@@ -193,6 +204,7 @@ def _segment(
         alone_games=[*progress.alone_games, len(alone)],
         alone_failures=[*progress.alone_failures, sum(alone)],
         converged_at=progress.converged_at,
+        regret=replays.scores if replays is not None else None,
     )
     return after if after.converged_at is not None else replace(after, converged_at=_converged_at(spec, after))
 
@@ -208,6 +220,7 @@ class _CurveRecorder(BaseCallback):
         self,
         environment: JoinedVecEnv,
         progress: Progress,
+        replays: RegretReplays | None,
         *,
         steps: int,
         step_s: float,
@@ -218,7 +231,7 @@ class _CurveRecorder(BaseCallback):
         `largest_deviation` is the bound after so many of them."""
         super().__init__()
         self._environment, self._on_progress, self._largest_deviation = environment, on_progress, largest_deviation
-        self._steps, self._step_s = steps, step_s
+        self._steps, self._step_s, self._replays = steps, step_s, replays
         self._window: list[Finished] = []
         self._window_start = progress.steps
         self.windows, self.games = list(progress.curve), list[Finished]()
@@ -257,8 +270,10 @@ class _CurveRecorder(BaseCallback):
             failure_rate=float(np.mean([game.outcome != Outcome.GOAL for game in games])),
             games=len(games),
             mean_duration_s=float(np.mean([game.steps for game in games])) * self._step_s,
+            mean_regret=self._replays.scores.mean_regret if self._replays is not None else None,
         )
-        for name in ("mean_payoff", "failure_rate", "mean_duration_s"):
-            self.logger.record(f"games/{name}", getattr(window, name))
+        for name in ("mean_payoff", "failure_rate", "mean_duration_s", "mean_regret"):
+            if (value := getattr(window, name)) is not None:
+                self.logger.record(f"games/{name}", value)
         self.windows.append(window)
         self._window, self._window_start = [], self.num_timesteps

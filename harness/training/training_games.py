@@ -8,7 +8,9 @@ from harness.config.persona import Persona
 from harness.config.training import Training
 from harness.drivers.mixture import Mixture, factors_of, shares_of
 from harness.drivers.policy_file import Policy
+from harness.drivers.protocol import Driver
 from harness.environments.arena import Arena, Seat
+from harness.environments.auto_reset import Replays
 from harness.environments.seats import seats_of
 from harness.environments.vector_env import ArenaVecEnv, JoinedVecEnv
 from harness.game.initial_state import StartDistribution
@@ -52,6 +54,8 @@ class TrainingSpec:
     as_it_drives: bool = False
     """Train with all human factors of the persona, as in assessment: a best response is computed under the limits under
     which it is assessed."""
+    best_known: Driver | None = None
+    """Of an ego: the best known one. With it, the training replays starts by regret (`regret_starts`)."""
 
     @property
     def demonstration_steps(self) -> int:
@@ -85,10 +89,17 @@ def _parts_of(number: int, *parts: str | int) -> tuple[str | int, ...]:
     return (*parts, "place", number) if number else parts
 
 
-def sample(spec: TrainingSpec, environment: JoinedVecEnv, steps: int, *parts: str | int) -> None:
-    """Draw the next games from these parts, `steps` after the start of the training."""
+def sample(
+    spec: TrainingSpec,
+    environment: JoinedVecEnv,
+    steps: int,
+    *parts: str | int,
+    replays: Replays | None = None,
+) -> None:
+    """Draw the next games from these parts, `steps` after the start of the training; `replays` are of a learner with
+    one place."""
     for number, (place, each) in enumerate(zip(spec.places, environment.environments, strict=True)):
-        each.sample_from(_start_distribution(spec, place, steps), *_parts_of(number, *parts))
+        each.sample_from(_start_distribution(spec, place, steps), *_parts_of(number, *parts), replays=replays)
 
 
 def _start_distribution(spec: TrainingSpec, place: LearningPlace, steps: int) -> StartDistribution:

@@ -231,6 +231,7 @@ def of_nobody_in_the_campaign(policies: Path) -> None:
         (of_other_observations, {}, "policy.json: observation", "observation layout"),
         (of_another_player, {}, "speedy-seed1: stage", "called 'speedy-seed1'"),
         (None, {"training": TRAINING}, "played.toml: training", "would be ignored"),
+        (None, {"retraining": {"starts": "regret"}}, "played.toml: retraining", "would be ignored"),
         *(
             (None, {table: {"alone_share": 0.5}}, f"played.toml: {table}", "would be ignored")
             for table in ("naive_training", "retraining", "non_ego_training")

@@ -61,6 +61,40 @@ def test_games__of_a_tile_do_not_depend_on_other_tiles(scene: OpenScene, order: 
         assert departures == (scene.departures(generator_of(*parts, "others")) if scene.has_background_traffic else [])
 
 
+class _Replays:
+    """Replays one start in tile 1, and nothing in the others."""
+
+    def __init__(self, start: InitialState) -> None:
+        self.start = start
+        self.told: list[tuple[int, float]] = []
+
+    def replay(self, tile: int, drawn: InitialState) -> InitialState | None:
+        return self.start if tile == 1 else None
+
+    def ended(self, tile: int, payoff: float) -> None:
+        self.told.append((tile, payoff))
+
+
+def test_games__a_replay_takes_the_place_of_a_drawn_game_and_changes_no_other(scene: OpenScene) -> None:
+    start_distribution = scene.start_distribution([HumanFactors(), HumanFactors()], [1.0, 0.5])
+    replays = _Replays(draw_initial_state(start_distribution, "pool", 3))
+    plain, arena = _RecordingArena(scene), _RecordingArena(scene)
+    drawn = AutoReset(plain, start_distribution, "a", 1)  # type: ignore[arg-type]
+    games = AutoReset(arena, start_distribution, "a", 1, replays=replays)  # type: ignore[arg-type]
+    drawn.ended(1, 2.5)
+    for tiles in ({0, 1}, {1, 2}, {0, 1}):
+        games.ended(1, 2.5)
+        drawn.reset(tiles)
+        games.reset(tiles)
+    assert replays.told == [(1, 2.5)] * 3
+    others = generator_of("pool", 3, "others")
+    departures = scene.departures(others) if scene.has_background_traffic else []
+    for (tile, start, departing), (_, alone, as_drawn) in zip(arena.resets, plain.resets, strict=True):
+        assert (start is replays.start) == (tile == 1)
+        assert departing == (departures if tile == 1 else as_drawn)
+        assert tile == 1 or start.parts == alone.parts
+
+
 def test_games__start_in_the_arena(scene: OpenScene, arena_of: Open) -> None:
     arena = arena_of(scene, TILES)
     AutoReset(arena, scene.start_distribution([HumanFactors(), HumanFactors()], [1.0, 1.0]), "a").reset([2])

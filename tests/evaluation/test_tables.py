@@ -133,6 +133,25 @@ def test_table__has_an_optional_column_only_where_a_cell_of_it_is_known(tmp_path
     assert read_csv(tmp_path / "episodes.csv").equals(both)
 
 
+def test_training__has_a_column_of_regret_only_where_starts_are_replayed():
+    row = {
+        "stage": "naive",
+        "persona": "",
+        "seed": 1,
+        "steps": 512,
+        "mean_payoff": 1.5,
+        "failure_rate": 0.5,
+        "games": 2,
+        "mean_duration_s": 3.0,
+        "stopped": "",
+        "mean_regret": None,
+    }
+    uniform, by_regret = table_of("training", [row]), table_of("training", [row, {**row, "mean_regret": 0.25}])
+    assert list(uniform.columns) == [name for name in row if name not in ("mean_regret", "stopped")] + ["stopped"]
+    assert by_regret["mean_regret"].isna().tolist() == [True, False]
+    assert joined("training", [uniform, by_regret])["mean_regret"].notna().tolist() == [False, False, True]
+
+
 def test_write_csv__truth_values_are_true_and_false(tmp_path):
     path = tmp_path / "comparisons.csv"
     row = {"question": "RQ1", "persona": "x", "seed": 1, "metric": "failure", "pairs": 2, "pairs_left_out": 0}

@@ -18,11 +18,22 @@ from stable_baselines3 import PPO
 
 from harness.environments.vector_env import ACTION_SPACE, OBSERVATION_SPACE
 from harness.training.checkpoint import CurvePoint, Progress, read_checkpoint, write_checkpoint
+from harness.training.regret_starts import RegretScores
 
 KEY = "key"
-POINT = CurvePoint(steps=8, mean_payoff=1.5, failure_rate=0.25, games=4, mean_duration_s=3.0)
+FIRST = CurvePoint(steps=4, mean_payoff=1.5, failure_rate=0.25, games=4, mean_duration_s=3.0)
+SECOND = CurvePoint(steps=8, mean_payoff=1.5, failure_rate=0.25, games=4, mean_duration_s=3.0, mean_regret=0.1)
+SCORES = RegretScores(
+    best_payoffs=[0.1, -2.0], preventable=[True, False], latest_payoffs=[1 / 3, None], last_replays=[1, 0], replays=1
+)
 PROGRESS = Progress(
-    segments=2, steps=16, segment_payoffs=[-float("inf"), 1.5], curve=[POINT], alone_games=[0, 4], alone_failures=[0, 1]
+    segments=2,
+    steps=16,
+    segment_payoffs=[-float("inf"), 1.5],
+    curve=[FIRST, SECOND],
+    alone_games=[0, 4],
+    alone_failures=[0, 1],
+    regret=SCORES,
 )
 Tensors = dict[str, torch.Tensor]
 Metadata = dict[str, str]

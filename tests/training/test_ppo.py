@@ -190,10 +190,12 @@ def samplings(monkeypatch: pytest.MonkeyPatch) -> list[StartDistribution]:
     sampled: list[StartDistribution] = []
     sample_from = ArenaVecEnv.sample_from
 
-    def recording(environment: ArenaVecEnv, start_distribution: StartDistribution, *parts: str | int) -> None:
+    def recording(
+        environment: ArenaVecEnv, start_distribution: StartDistribution, *parts: str | int, **options: Any
+    ) -> None:
         if "segment" in parts:
             sampled.append(start_distribution)
-        sample_from(environment, start_distribution, *parts)
+        sample_from(environment, start_distribution, *parts, **options)
 
     monkeypatch.setattr(ArenaVecEnv, "sample_from", recording)
     return sampled

@@ -56,6 +56,8 @@ def _inputs(campaign: OpenCampaign, stage: Stage) -> dict[str, Any]:
     match stage:
         case TrainingStage():
             inputs["training"] = training_settings(document, stage).record()
+            if stage.best_known is not None:
+                inputs["regret"] = {"best_known": repr(stage.best_known), "references": reference_identity()}
         case SearchStage():
             assert campaign.ego_driver is not None
             inputs["reconfiguration"] = document.reconfiguration.record()

@@ -76,6 +76,7 @@ def _spec(stage: TrainingStage, run: StageRun, scene: OpenScene) -> TrainingSpec
         settings=training_settings(context.document, stage),
         parts=("training", stage.seed, stage.name),
         as_it_drives=stage.is_best_response,
+        best_known=players.driver(stage.best_known) if stage.best_known is not None else None,
     )
 
 

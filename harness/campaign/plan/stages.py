@@ -4,7 +4,7 @@ afterwards."""
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import chain
 from typing import ClassVar, TypeAlias
 
@@ -123,6 +123,9 @@ class TrainingStage(_Stage):
     """The share of its games without the opponent."""
     attentive_share: float = 0.0
     """The share of its budget in which the learner's attention does not lapse."""
+    best_known: Trained | TrainedBefore | None = field(default=None, repr=False)
+    """Of an ego that replays starts by regret: the best known ego, with which it is compared. Not a part of the stage's
+    text, so that a training without one has the key that it had before there were any."""
 
     kind, verb, unit = "training", "train", "steps"
 
@@ -141,7 +144,8 @@ class TrainingStage(_Stage):
 
     @property
     def drivers(self) -> tuple[PlannedDriver, ...]:
-        return (*((self.initial,) if self.initial is not None else ()), *self.opponent)
+        policies = (each for each in (self.initial, self.best_known) if each is not None)
+        return (*policies, *self.opponent)
 
 
 @dataclass(frozen=True, kw_only=True)

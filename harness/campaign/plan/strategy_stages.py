@@ -34,6 +34,8 @@ from harness.evaluation.strategies import (
     OtherEgo,
     PersonaNonEgo,
     ReconfiguredEgo,
+    RetrainedEgo,
+    RobustEgo,
     RoundAnswer,
     SumoNonEgo,
     player_of,
@@ -100,6 +102,8 @@ class SeedStages:
         """The training of a person, or of an ego after the naive one."""
         campaign, is_person = self.campaign, player_of(strategy) == NON_EGO
         warm = campaign.retraining.warm_start and not is_person
+        is_of_round_2 = isinstance(strategy, RetrainedEgo | RobustEgo)  # a later ego is a `RoundAnswer`
+        by_regret = campaign.retraining.starts == "regret" and is_of_round_2
         return TrainingStage(
             seed=self.seed,
             persona=persona,
@@ -109,6 +113,7 @@ class SeedStages:
             alone_share=campaign.non_ego_training.alone_share if is_person else campaign.retraining.alone_share,
             attentive_share=ATTENTIVE_SHARE if is_person else 0.0,
             gates=self.gates.get(strategy, ()),
+            best_known=self._learned(NaiveEgo()) if by_regret else None,
         )
 
     def _driver(self, strategy: EgoStrategy | NonEgoStrategy) -> PlannedMember:

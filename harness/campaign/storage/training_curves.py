@@ -25,6 +25,7 @@ class _Point(Document):
     failure_rate: float
     games: int = Field(ge=0, le=10**12)
     mean_duration_s: float
+    mean_regret: float | None = None
 
 
 def curves_so_far(folder: RunFolder, stages: Sequence[Stage]) -> pd.DataFrame:

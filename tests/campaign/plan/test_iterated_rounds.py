@@ -314,6 +314,14 @@ def test_plan__a_population_is_met_as_a_persona_is(tmp_path: Path) -> None:
         ({"crossplay": {"egos": ["sumo", "sumo"]}}, "crossplay.egos", "two drivers"),
         ({"crossplay": {"egos": ["learned"]}}, "crossplay.egos", "always take part"),
         ({"ego": {"driver": "sumo", "persona": str(CAREFUL)}, "rounds": {"count": 4}}, "rounds.count", "not learn"),
+        (
+            {"ego": {"driver": "sumo", "persona": str(CAREFUL)}, "retraining": {"starts": "regret"}},
+            "retraining.starts",
+            "not learn",
+        ),
+        ({"personas": [], "retraining": {"starts": "regret"}}, "retraining.starts", "no ego is retrained"),
+        ({"retraining": {"starts": "regret", "alone_share": 1.0}}, "retraining.starts", "no game is played against"),
+        ({"retraining": {"starts": "regrets"}}, "retraining.starts", "'regrets' is not possible"),
         ({"ego": {"driver": "sumo", "persona": str(CAREFUL), "shield": "rss"}}, "ego.shield", "SUMO drives this ego"),
         (
             {"ego": {"driver": "sumo", "persona": str(CAREFUL)}, "crossplay": {"egos": ["sumo"]}},
@@ -328,6 +336,6 @@ def test_campaign__names_without_a_meaning_are_refused(
     both = [str(write_persona(tmp_path, name)) for name in BOTH]
     shutil.copy(REPOSITORY / "egos" / "adas.toml", tmp_path / f"{'x' * 41}.toml")
     with pytest.raises(UsageError) as error:
-        open_campaign(write_campaign(tmp_path, personas=both, **changes))
+        open_campaign(write_campaign(tmp_path, **{"personas": both, **changes}))
     assert key in str(error.value)
     assert words in str(error.value)

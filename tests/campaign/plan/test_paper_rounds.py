@@ -105,6 +105,22 @@ def test_plan__trainings_of_a_learned_ego(warm: bool) -> None:
     )
 
 
+def test_plan__egos_of_round_2_are_compared_with_the_naive_ego_where_starts_are_by_regret() -> None:
+    asked: dict[str, Any] = {"rounds": {"count": 4}}
+    by_regret = stages_of("anna", retraining={"starts": "regret", "against": ["anna"]}, **asked)
+    uniform = stages_of("anna", retraining={"against": ["anna"]}, **asked)
+    trainings = {name: stage for name, stage in by_regret.items() if isinstance(stage, TrainingStage)}
+    of_round_2 = {"retrained_anna", "robust"}
+    assert {name for name, stage in trainings.items() if stage.best_known is not None} == of_round_2
+    for name in of_round_2:
+        assert trainings[name].best_known == Trained(stage="naive-seed1")
+        assert "naive-seed1" in trainings[name].needs
+        assert "naive-seed1" not in uniform[name].needs
+    assert {name: repr(stage) for name, stage in by_regret.items()} == {
+        name: repr(stage) for name, stage in uniform.items()
+    }  # the keys of stages without replays are those that they had
+
+
 def test_plan__the_naive_ego_may_train_alone(tmp_path: Path) -> None:
     stages, beside = planned(tmp_path)
     alone, keys = planned(tmp_path, naive_training={"alone_share": 1.0})
@@ -200,6 +216,11 @@ def test_keys__what_a_persona_declares_of_people_changes_no_game(tmp_path: Path,
             {"retraining": {"alone_share": 0.5}},
             {"retrained_speedy", "retrained_vs_speedy", "retrained_alone_speedy"},
         ),
+        (
+            {"retraining": {"starts": "regret"}},
+            {"retrained_speedy", "retrained_vs_speedy", "retrained_alone_speedy"},
+        ),
+        ({"retraining": {"starts": "uniform"}}, set()),
     ],
 )
 def test_keys__a_setting_changes_what_follows_from_it(
