@@ -8,6 +8,7 @@ the regret of a start is
 
 by the payoff of the ego's persona. A success has a regret as well, if another driver earns more. A start in which all
 of these drivers fail is unpreventable, and is never replayed; games that are drawn anew have such starts as before.
+The random numbers of SUMO's own drivers are not those of the first game when a start is replayed.
 
 Which start is replayed follows "Prioritized Level Replay" (M. Jiang, E. Grefenstette, T. Rocktäschel, ICML 2021), with
 regret as the score. PAIRED (M. Dennis et al., NeurIPS 2020) takes regret from a learned antagonist, ACCEL (J.
