@@ -18,6 +18,7 @@ from harness.assessment.route_trial import try_routes
 from harness.cli import messages
 from harness.config.scene import SCENE_FILE
 from harness.errors import Problem, SimulationError, UsageError
+from harness.files import scratch_beside
 from harness.game.roles import EGO
 from harness.maps.varied_road import RoadVariation, Warp, vary_net, vary_route_file, warp_of
 from harness.road.net.network import lane_line, read_net
@@ -76,11 +77,14 @@ def write_variant(scene: OpenScene, seed: int, out: Path) -> VariedScene:
             if reason:
                 problems.append(reason)
                 continue
+            copy = scratch_beside(out / name)
             try:
-                shutil.copytree(folder, out / f".{name}")
-                os.rename(out / f".{name}", out / name)
+                shutil.copytree(folder, copy)
+                os.rename(copy, out / name)
             except OSError as error:
                 raise UsageError.of(out, "", *messages.cannot_write(error)) from None
+            finally:
+                shutil.rmtree(copy, ignore_errors=True)
             return VariedScene(out / name, variation, tuple(problems))
     message = f"none of {_ATTEMPTS} roads of seed {seed} can be driven: {problems[-1]}"
     raise UsageError.of(scene.folder, "", message, "choose another --seed, or another scene")
@@ -119,7 +123,8 @@ def _write(scene: OpenScene, name: str, variation: RoadVariation, folder: Path) 
 def words_of(variation: RoadVariation) -> str:
     """How a road differs from that of its scene."""
     shares = f"lengths × {variation.length_share:.2f}, lane widths × {variation.width_share:.2f}, "
-    bend = f"limits × {variation.limit_share:.2f}, bend {variation.bend_mps2:+.1f} m/s² (left), "
+    side = "left" if variation.bend_mps2 > 0.0 else "right"
+    bend = f"limits × {variation.limit_share:.2f}, bend of {abs(variation.bend_mps2):.1f} m/s² to the {side}, "
     return f"{shares}{bend}angles {variation.angle_deg:+.0f}°"
 
 

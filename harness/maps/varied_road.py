@@ -140,7 +140,8 @@ def vary_route_file(file: Path, varied: Path, variation: RoadVariation) -> None:
 def _netconvert(net_file: Path, folder: Path, options: Sequence[str]) -> None:
     finished = run_program("netconvert", ["--xml-validation", "never", *options], folder, _PATIENCE_S)
     if finished is None or finished.returncode:
-        reason = "it takes too long" if finished is None else finished.stderr.strip().splitlines()[-1:] or "no reason"
+        lines = ["it takes too long"] if finished is None else finished.stderr.strip().splitlines()
+        reason = lines[-1] if lines else "it gives no reason"
         raise UsageError.of(net_file, "", f"netconvert can't vary it: {reason}", "vary another scene")
 
 
