@@ -8,6 +8,10 @@ BIN := .venv/bin
 # A process per core, at most four: tests start campaigns that take several cores themselves. `ARGS="-n 0"` is one process.
 PYTEST := $(BIN)/pytest -n auto --maxprocesses 4 --dist worksteal
 INSTALLED := .venv/installed
+# uv reads none of pip's settings: a folder of wheels that is named to pip serves uv too.
+ifdef PIP_FIND_LINKS
+export UV_FIND_LINKS ?= $(PIP_FIND_LINKS)
+endif
 
 .DEFAULT_GOAL := help
 .PHONY: help install demo campaign quick test test-release test-esmini wheel coverage bench publish docs check lock clean
@@ -77,7 +81,7 @@ $(INSTALLED): requirements.lock pyproject.toml
 	@$(PYTHON) -m venv .venv || { \
 	    echo "$(PYTHON) can't make virtual environments (on Debian and Ubuntu: apt-get install python3-venv)" >&2; exit 1; }
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check uv
-	$(BIN)/uv pip install --python $(BIN)/python -r requirements.lock
+	$(BIN)/uv pip install --no-config --python $(BIN)/python -r requirements.lock
 	$(BIN)/uv pip install --python $(BIN)/python --no-deps --no-build-isolation -e .
 	@$(BIN)/python -c 'import libsumo' || { \
 	    echo "SUMO lacks system libraries (on Debian and Ubuntu:" \

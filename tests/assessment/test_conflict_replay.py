@@ -47,7 +47,7 @@ def straight(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
         tmp_path_factory.mktemp("scenes") / "straight",
         '<node id="a" x="0" y="0"/><node id="b" x="900" y="0"/>',
         f'<edge id="road" from="a" to="b" numLanes="2" speed="40" width="{LANE_M}" spreadType="right"/>',
-        STRAIGHT,
+        {"ego": ("road", "road_1"), "non_ego": ("road", "road_0"), "goal": "road"},
         goal_m=850.0,
         time_limit_s=60.0,
     )
@@ -64,7 +64,7 @@ def cut_in(scene: OpenScene, *, gap_m: float, own_kmh: float, other_kmh: float, 
     touching = np.flatnonzero((ahead < LENGTH_M) & (offset < WIDTH_M))
     failed = int(touching[0])
     steps = failed + round(AFTERWARDS_S / STEP_S) + 1
-    lane_y = -0.5 * LANE_M  # the centre of the left lane, in which the route runs
+    lane_y = -0.5 * LANE_M  # the centre of the left lane, in which the ego starts
     players = np.zeros((steps, 2, 4))
     players[:, EGO] = np.stack(poses(START_X_M + own * time, np.full_like(time, lane_y), own), axis=1)[:steps]
     players[:, 1] = np.stack(poses(START_X_M + own * time + ahead, lane_y - offset, other), axis=1)[:steps]
