@@ -20,7 +20,7 @@ from harness.game.arrays import FloatArray
 from harness.game.roles import EGO
 from harness.road.scene.open_scene import OpenScene
 from tests.support.rollouts import Steady, arm, play, trace
-from tests.support.scenes import STRAIGHT, build_scene
+from tests.support.scenes import build_scene
 
 KMH = 1.0 / 3.6
 LENGTH_M, WIDTH_M, LANE_M = 4.3, 1.9, 3.5  # of the cars and the lanes in the programme
