@@ -15,6 +15,7 @@ from harness.drivers.ordinary_walker import OrdinaryWalker
 from harness.drivers.rules_driver import LANE_KEEPER, RulesDriver
 from harness.environments.arena import Arena
 from harness.environments.seats import Seat
+from harness.errors import Problem, SimulationError, UsageError
 from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import draw_initial_state
 from harness.game.outcome import Outcome
@@ -82,3 +83,14 @@ def try_routes(scene: OpenScene, *, starts: int = STARTS) -> list[RouteTrial]:
             RouteTrial(role=world.roles[player], starts=starts, arrived=starts - len(failed), failure=failure)
         )
     return trials
+
+
+def check_routes(scene: OpenScene, remedy: str) -> None:
+    """Raise UsageError, with a remedy, for each route that a rule-based driver can't drive from every start."""
+    name = scene.folder.name
+    try:
+        trials = try_routes(scene)
+    except (SimulationError, FloatingPointError) as error:
+        raise UsageError.of(name, "", f"its routes can't be driven: {error}", remedy) from None
+    if problems := [Problem(name, "", trial.sentence(), remedy) for trial in trials if trial.failure]:
+        raise UsageError(problems)

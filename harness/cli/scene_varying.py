@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import tomli_w
 
-from harness.assessment.route_trial import try_routes
+from harness.assessment.route_trial import check_routes
 from harness.cli import messages
 from harness.config.scene import SCENE_FILE
-from harness.errors import Problem, SimulationError, UsageError
+from harness.errors import Problem, UsageError
 from harness.files import scratch_beside
 from harness.game.roles import EGO
 from harness.maps.varied_road import RoadVariation, Warp, vary_net, vary_route_file, warp_of
@@ -47,8 +47,12 @@ def name_of_variant(scene: OpenScene, seed: int) -> str:
     return f"{scene.document.name}_road{seed}"
 
 
-def check_free(scene: OpenScene, seeds: Sequence[int], out: Path) -> None:
-    """Raise UsageError if variants can't be written to a folder."""
+def check_variable(scene: OpenScene, seeds: Sequence[int], out: Path) -> None:
+    """Raise UsageError if a scene can't be varied, or its variants can't be written to a folder."""
+    files = (scene.document.net, scene.document.routes, *scene.document.additional)
+    if packed := [scene.folder / each for each in files if each.lower().endswith(".gz")]:
+        message, remedy = "is compressed, and only plain files are varied", "unpack it, and name the plain file"
+        raise UsageError(Problem(str(path), "", message, remedy) for path in packed)
     taken = [path for seed in seeds if os.path.lexists(path := out / name_of_variant(scene, seed))]
     if taken:
         message, remedy = (
@@ -71,11 +75,11 @@ def write_variant(scene: OpenScene, seed: int, out: Path) -> VariedScene:
             folder.mkdir(parents=True)
             try:
                 _write(scene, name, variation, folder)
-                reason = _not_drivable(folder)
+                varied = open_scene(folder)
+                check_loads(varied)
+                check_routes(varied, "choose another --seed")
             except UsageError as error:
-                reason = "; ".join(str(problem) for problem in error.problems)
-            if reason:
-                problems.append(reason)
+                problems.append("; ".join(problem.message for problem in error.problems))
                 continue
             copy = scratch_beside(out / name)
             try:
@@ -88,18 +92,6 @@ def write_variant(scene: OpenScene, seed: int, out: Path) -> VariedScene:
             return VariedScene(out / name, variation, tuple(problems))
     message = f"none of {_ATTEMPTS} roads of seed {seed} can be driven: {problems[-1]}"
     raise UsageError.of(scene.folder, "", message, "choose another --seed, or another scene")
-
-
-def _not_drivable(folder: Path) -> str:
-    """Why a rule-based driver can't drive the routes of a scene; empty if it can. Raises UsageError for a scene that is
-    not in order."""
-    opened = open_scene(folder)
-    check_loads(opened)
-    try:
-        trials = try_routes(opened)
-    except (SimulationError, FloatingPointError) as error:
-        return f"its routes can't be driven: {error}"
-    return "; ".join(trial.sentence() for trial in trials if trial.failure)
 
 
 def _write(scene: OpenScene, name: str, variation: RoadVariation, folder: Path) -> None:

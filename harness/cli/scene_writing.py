@@ -13,10 +13,10 @@ from xml.etree import ElementTree
 
 from markupsafe import Markup
 
-from harness.assessment.route_trial import try_routes
+from harness.assessment.route_trial import check_routes
 from harness.cli import messages
 from harness.cli.new_documents import check_name, rendered
-from harness.errors import Problem, SimulationError, UsageError, plain
+from harness.errors import Problem, UsageError, plain
 from harness.files import make_folder, write_atomically
 from harness.maps.candidates import CandidateKind
 from harness.maps.game_plans import GamePlan
@@ -104,14 +104,7 @@ def _checked(opened: OpenMap, name: str, plan: GamePlan, folder: Path) -> Path:
         (scene / file).write_text(text, encoding="utf-8")
     opened_scene = open_scene(scene)
     check_loads(opened_scene)
-    remedy = "choose another conflict"
-    try:
-        trials = try_routes(opened_scene)
-    except (SimulationError, FloatingPointError) as error:
-        raise UsageError.of(scene.name, "", f"its routes can't be driven: {error}", remedy) from None
-    problems = [Problem(scene.name, "", trial.sentence(), remedy) for trial in trials if trial.failure]
-    if problems:
-        raise UsageError(problems)
+    check_routes(opened_scene, "choose another conflict")
     return scene
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gzip
+import shutil
 from pathlib import Path
 
 import pytest
@@ -46,3 +48,13 @@ def test_vary__writes_a_scene_that_is_in_order_and_says_how_its_road_differs(
 def test_vary__into_a_folder_that_is_not_there_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="--out"):
         vary(PAPER_MERGE, "--out", tmp_path / "nowhere")
+
+
+def test_vary__a_scene_with_a_compressed_file_is_refused_before_a_road_is_drawn(tmp_path: Path) -> None:
+    scene = Path(shutil.copytree(PAPER_MERGE, tmp_path / "scene"))
+    routes = scene / "paper_merge.rou.xml"
+    (scene / "paper_merge.rou.xml.gz").write_bytes(gzip.compress(routes.read_bytes()))
+    document = scene / "scene.toml"
+    document.write_text(document.read_text().replace(routes.name, f"{routes.name}.gz"))
+    with pytest.raises(UsageError, match=r"paper_merge\.rou\.xml\.gz: is compressed"):
+        vary(scene, "--out", tmp_path)

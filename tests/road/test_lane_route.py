@@ -91,7 +91,7 @@ def test_links__have_the_fewest_changes_of_lane_of_all_ways_along_the_route(scen
         for following in edge.getOutgoing():
             along = LaneRoute([edge, following])
             for start in edge.getLanes():
-                if links := along.links_after(0):
+                if links := along.choices[0]:
                     chosen = LaneRoute([edge, following], start=start).links
                     least = min(abs(link.getFromLane().getIndex() - start.getIndex()) for link in links)
                     assert abs(chosen[0].getFromLane().getIndex() - start.getIndex()) == least

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from sumolib.net.connection import Connection
@@ -34,8 +35,7 @@ class LaneRoute:
         Raises ValueError if consecutive edges are not connected.
         """
         onward: dict[str, tuple[int, list[Connection]]] = {lane.getID(): (0, []) for lane in self.edges[-1].getLanes()}
-        for k in reversed(range(len(self.edges) - 1)):
-            links = self.links_after(k)
+        for k, links in reversed(list(enumerate(self.choices))):
             if not links:
                 names = [each.getID() for each in self.edges[k : k + 2]]
                 raise ValueError(f"has no connection from edge {names[0]!r} to {names[1]!r}")
@@ -52,20 +52,25 @@ class LaneRoute:
         first = self.links[0].getFromLane() if self.links else self.start or self.lanes_of(self.edges[0])[-1]
         return [first, *(link.getToLane() for link in self.links)]
 
-    def links_after(self, k: int) -> list[Connection]:
-        """The connections from edge k to the next one, on lanes that the player may use."""
-        edge, following = self.edges[k], self.edges[k + 1]
-        starts, ends = self.lanes_of(edge), self.lanes_of(following)
+    @cached_property
+    def choices(self) -> list[list[Connection]]:
+        """Between each two edges: the connections on lanes that the player may use."""
+        lanes = [self.lanes_of(edge) for edge in self.edges]
         return [
-            link for link in edge.getConnections(following) if link.getFromLane() in starts and link.getToLane() in ends
+            [
+                link
+                for link in edge.getConnections(following)
+                if link.getFromLane() in starts and link.getToLane() in ends
+            ]
+            for (edge, starts), (following, ends) in pairwise(zip(self.edges, lanes, strict=True))
         ]
 
     def lane_ends(self, end_of_edge_m: Sequence[float]) -> list[dict[str, float]]:
         """For each edge, by lane: the station where the lane stops leading along the route; inf if it never does.
         `end_of_edge_m` are the stations of the ends of the edges."""
         ends = [{lane.getID(): np.inf for lane in self.lanes_of(self.edges[-1])}]
-        for k in reversed(range(len(self.edges) - 1)):
-            links, following = self.links_after(k), ends[0]
+        for k, links in reversed(list(enumerate(self.choices))):
+            following = ends[0]
             of_lanes = {}
             for lane in self.lanes_of(self.edges[k]):
                 reached = [following[link.getToLane().getID()] for link in links if link.getFromLane() is lane]

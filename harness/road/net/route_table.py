@@ -64,7 +64,7 @@ def junctions_on_route(net: Net, route: LaneRoute) -> list[JunctionOnRoute]:
         return []
     _, starts = route_line(net, route)
     return [
-        JunctionOnRoute(link=link, links=route.links_after(k), begin_m=starts[2 * k + 1])
+        JunctionOnRoute(link=link, links=route.choices[k], begin_m=starts[2 * k + 1])
         for k, link in enumerate(route.links)
     ]
 
@@ -167,7 +167,7 @@ def _pieces(net: Net, route: LaneRoute) -> list[_Piece]:
         lanes = [(lane_line(lane), lane) for lane in route.lanes_of(edge)]
         pieces.append(_Piece(line=lines[2 * k], lanes=lanes, edge=k, speed_mps=route.entries[k].getSpeed()))
         if k < len(links):
-            lanes = [(line_over_junction(net, link), link.getToLane()) for link in route.links_after(k)]
+            lanes = [(line_over_junction(net, link), link.getToLane()) for link in route.choices[k]]
             speed_mps = [*inner_lanes(net, links[k]), links[k].getToLane()][0].getSpeed()
             over = lines[2 * k + 1]
             pieces.append(_Piece(line=over, lanes=lanes, edge=k + 1, speed_mps=speed_mps, is_junction=True))
