@@ -42,9 +42,8 @@ def training_spec(settings: Training) -> TrainingSpec:
     opponent = persona(_OPPONENT)
     driver = LearnedDriver(coasting_policy(), sampled=opponent.decisions == "sampled")
     return TrainingSpec(
-        scene=merge_scene(),
         persona=persona("careful"),
-        places=(LearningPlace(player=EGO, drivers=(None, mixture_of(driver, opponent))),),
+        places=(LearningPlace(scene=merge_scene(), player=EGO, drivers=(None, mixture_of(driver, opponent))),),
         alone_share=Retraining().alone_share,
         attentive_share=0.0,
         initial=coasting_policy(),

@@ -16,6 +16,7 @@ SECTIONS = {
         "campaigns",
         "commands",
         "league",
+        "roads",
         "egos",
         "observation",
         "egos-by-rules",

@@ -13,17 +13,16 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from pydantic import ConfigDict
-
-from harness.campaign.plan.campaign_checks import check_names, check_people
+from harness.campaign.plan.campaign_checks import check_names, check_people, check_roads
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import Stage
 from harness.campaign.plan.strategy_stages import crossplay_name
 from harness.campaign.trained_policies import check_policies, find_policies
-from harness.config.campaign import LEARNED, SUMO, Campaign, DocumentPath, Ego
+from harness.config.campaign import LEARNED, SUMO, Campaign
+from harness.config.campaign_names import CampaignNames
 from harness.config.ego_perception import EgoPerception
 from harness.config.persona import Persona
-from harness.config.toml_reading import Document, read_document
+from harness.config.toml_reading import read_document
 from harness.config.traits import traits_of
 from harness.drivers import driver_files, policy_origin
 from harness.drivers.car import car_of
@@ -40,29 +39,6 @@ QUICK_TRIALS = 12
 QUICK_RESPONSE_STEPS = 131_072
 
 
-class _NamedByEgo(Document):
-    model_config = ConfigDict(extra="ignore")
-    driver: DocumentPath = LEARNED
-    persona: DocumentPath = Ego().persona
-    perception: DocumentPath | dict[str, Any] | None = None
-
-
-class _NamedByAttribution(Document):
-    model_config = ConfigDict(extra="ignore")
-    baseline: DocumentPath
-
-
-class _Names(Document):
-    """The documents that a campaign names: they are checked even where the rest of it is wrong."""
-
-    model_config = ConfigDict(extra="ignore")
-    scene: DocumentPath
-    personas: list[DocumentPath]
-    policies: DocumentPath | None = None
-    ego: _NamedByEgo = _NamedByEgo()
-    attribution: _NamedByAttribution | None = None
-
-
 @dataclass(frozen=True, kw_only=True)
 class OpenCampaign:
     """A campaign whose documents are all read and checked."""
@@ -71,6 +47,8 @@ class OpenCampaign:
     document: Campaign
     quick: bool
     scene: OpenScene
+    roads: tuple[OpenScene, ...]
+    """The scenes on whose roads the egos learn too."""
     ego_persona: Persona
     personas: tuple[Persona, ...]
     baseline: Persona | None
@@ -113,6 +91,10 @@ class OpenCampaign:
         """SHA-256 of one of those files."""
         return self.hashes[_relative(self.file, path)]
 
+    def hashes_of(self, scene: OpenScene) -> dict[str, str]:
+        """SHA-256 of the files of one of its scenes, by name."""
+        return {name: self.hash_of(scene.folder / name) for name in scene.document.files}
+
 
 def open_campaign(
     file: Path, quick: bool = False, allow_code: bool = False, policies_exist: bool = True
@@ -125,7 +107,7 @@ def open_campaign(
     """
     problems: list[Problem] = []
     document = collect(problems, lambda: read_document(file, Campaign))
-    named = document or collect([], lambda: read_document(file, _Names))
+    named = document or collect([], lambda: read_document(file, CampaignNames))
     if named is None:
         raise UsageError(problems)
     driver = named.ego.driver
@@ -134,6 +116,7 @@ def open_campaign(
         ego_driver = collect(problems, lambda: find_driver(driver, file, "ego.driver", allow_code))
     vehicle_type = ego_driver.vehicle_type if ego_driver is not None else None
     scene = collect(problems, lambda: open_scene(_find_named(file, "scene", named.scene, "networks"), vehicle_type))
+    roads = [collect(problems, partial(_open_road, file, each)) for each in named.roads]
     written = [("ego.persona", named.ego.persona), *(("personas", each) for each in named.personas)]
     if named.attribution is not None:
         written.append(("attribution.baseline", named.attribution.baseline))
@@ -160,13 +143,16 @@ def open_campaign(
                 collect(problems, partial(_note_origin, each, scene, ego_persona, elsewhere))
     policies = collect(problems, lambda: find_policies(file, named.policies, policies_exist))
     problems += _same_names(file, named.personas, personas, baseline)
+    opened = [each for each in roads if each is not None]
     if not problems and scene is not None:
-        collect(problems, lambda: check_loads(scene))
+        for each_scene in (scene, *opened):
+            collect(problems, partial(check_loads, each_scene))
     if problems or document is None or scene is None or ego_persona is None:
         raise UsageError(problems)
     read = [each for each in personas if each is not None]
     tunable, traits, names = _is_tunable(ego_driver), traits_of(read, baseline), [persona.name for persona in read]
     check_people(file, document, len(scene.document.non_ego))
+    check_roads(file, document, scene, opened)
     check_names(file, document, names, tunable, traits)
     files, policy_drivers = list[Path](), dict[str, ExternalDriver]()
     if policies is not None and policies_exist:
@@ -181,7 +167,8 @@ def open_campaign(
             allow_code=allow_code,
             elsewhere=elsewhere,
         )
-    files = [file, *files, *persona_files, *(scene.folder / each for each in scene.document.files)]
+    scene_files = (each.folder / name for each in (scene, *opened) for name in each.document.files)
+    files = [file, *files, *persona_files, *scene_files]
     for external in (ego_driver, *other_egos.values()):
         files += map(Path, external.files if external is not None else ())
     quick = quick and (policies is None or tunable)
@@ -190,6 +177,7 @@ def open_campaign(
         document=_quickened(document) if quick else document,
         quick=quick,
         scene=scene,
+        roads=tuple(opened),
         ego_persona=ego_persona,
         personas=tuple(read),
         baseline=baseline,
@@ -220,6 +208,11 @@ def _find_named(file: Path, key: str, written: str, kind: Kind) -> Path:
     if is_name(written, kind) and not os.path.exists(found):
         raise UsageError.of(file, key, *missing_document(written, file.parent, kind))
     return found
+
+
+def _open_road(file: Path, written: str) -> OpenScene:
+    """A scene on whose road the egos learn too. Raises UsageError if it is missing or wrong."""
+    return open_scene(_find_named(file, "roads", written, "networks"))
 
 
 def _read_persona(file: Path, key: str, written: str, files: list[Path]) -> Persona:

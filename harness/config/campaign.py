@@ -202,6 +202,10 @@ class Campaign(Document):
     """The name of the campaign. The default run folder is reports/<name>."""
     scene: DocumentPath
     """Folder of the scene, relative to this file, or the name of a shipped scene."""
+    roads: list[DocumentPath] = Field([], max_length=50)
+    """Scenes with the same players on other roads, as `harness scene vary` writes them. An ego that learns plays an
+    equal part of its games on each of them and on the road of `scene`. People learn on the road of `scene`, and all
+    players are assessed there. Folders, relative to this file, or names of shipped scenes."""
     personas: list[DocumentPath] = Field(max_length=50)
     """Files of the personas that the ego meets, one after the other, relative to this file, or names of shipped
     personas. With none, `[]`, the ego drives alone and among SUMO's drivers."""

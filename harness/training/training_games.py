@@ -25,8 +25,9 @@ scene says: players that start apart seldom meet."""
 
 @dataclass(frozen=True, kw_only=True)
 class LearningPlace:
-    """A place of the scene in which the learner drives in a part of the games, and who drives in the others."""
+    """A place of a scene in which the learner drives in a part of the games, and who drives in the others."""
 
+    scene: OpenScene
     player: int
     """The learner's place on the players' axis."""
     drivers: tuple[Mixture | None, ...]
@@ -37,11 +38,10 @@ class LearningPlace:
 class TrainingSpec:
     """The inputs of a training: who learns in which places, beside whom, from which parameters, by which settings."""
 
-    scene: OpenScene
     persona: Persona
     """Of the learner: its payoff and human factors."""
     places: tuple[LearningPlace, ...]
-    """Each has an equal part of the games."""
+    """Each has an equal part of the games. The first one is in the scene of the campaign."""
     alone_share: float
     """Share of the games without other players."""
     attentive_share: float
@@ -56,6 +56,11 @@ class TrainingSpec:
     which it is assessed."""
     best_known: Driver | None = None
     """Of an ego: the best known one. With it, the training replays starts by regret (`regret_starts`)."""
+
+    @property
+    def scene(self) -> OpenScene:
+        """The scene of the campaign."""
+        return self.places[0].scene
 
     @property
     def demonstration_steps(self) -> int:
@@ -73,7 +78,7 @@ def open_games(spec: TrainingSpec) -> JoinedVecEnv:
             seats = [seats_of(each, paid=False) for each in place.drivers]
             seats[place.player] = (Seat(None, spec.persona.payoff),)
             own_games = games // places + (number < games % places)
-            arena = Arena(spec.scene, own_games, seats, seed=seed_of(*spec.parts, "sumo") % 2**31)
+            arena = Arena(place.scene, own_games, seats, seed=seed_of(*spec.parts, "sumo") % 2**31)
             starts, parts = _start_distribution(spec, place, 0), _parts_of(number, *spec.parts)
             scale = spec.settings.payoff_scale
             environments.append(ArenaVecEnv(arena, place.player, starts, *parts, payoff_scale=scale))
@@ -115,7 +120,7 @@ def _start_distribution(spec: TrainingSpec, place: LearningPlace, steps: int) ->
     if steps < attentive_steps(spec):
         human_factors = [[replace(each, attention=None) for each in of_player] for of_player in human_factors]
     shares = [shares_of(each) for each in place.drivers]
-    starts = spec.scene.start_distribution(human_factors, present, shares, ALONG_ROUTE_SHARE)
+    starts = place.scene.start_distribution(human_factors, present, shares, ALONG_ROUTE_SHARE)
     return replace(starts, meet_in_place=True)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -123,6 +124,23 @@ def test_open_campaign__a_shield_needs_an_ego_that_decides(tmp_path: Path) -> No
     assert (problem.key, Path(problem.file).name) == ("ego.shield", "tiny.toml")
     assert "SUMO drives the ego 'krauss.toml'" in problem.message
     assert "another ego.driver" in problem.remedy
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "words"),
+    [
+        ({"roads": ["merge_convoy"]}, "roads", "its players"),
+        ({"roads": ["merge"], "retraining": {"starts": "regret"}}, "retraining.starts", "one road"),
+        ({"roads": ["merge"], "ego": {"driver": "sumo"}}, "roads", "no ego is trained"),
+        ({"roads": ["merge"], "training": {"games": 1}}, "training.games", "give at least 2"),
+    ],
+)
+def test_open_campaign__roads_on_which_no_ego_can_learn_are_refused(
+    changes: dict[str, Any], key: str, words: str, tmp_path: Path
+) -> None:
+    (problem,) = problems_of(write_campaign(tmp_path, **changes))
+    assert problem.key == key
+    assert words in f"{problem.message}; {problem.remedy}"
 
 
 def test_open_campaign__perception_errors_need_an_ego_that_decides(tmp_path: Path) -> None:

@@ -19,9 +19,8 @@ from tests.support.tiny import CAREFUL, settings
 def naive_ego(scene: OpenScene) -> TrainingSpec:
     """The naive ego's spec, tiny: three segments."""
     return TrainingSpec(
-        scene=scene,
         persona=read_document(CAREFUL, Persona),
-        places=(LearningPlace(player=EGO, drivers=(None, None)),),
+        places=(LearningPlace(scene=scene, player=EGO, drivers=(None, None)),),
         alone_share=1.0,
         attentive_share=0.0,
         initial=None,
@@ -33,7 +32,7 @@ def naive_ego(scene: OpenScene) -> TrainingSpec:
 def beside(spec: TrainingSpec, player: int, other: Mixture | None, **changes: Any) -> TrainingSpec:
     """A training in another place, beside another driver."""
     drivers = (other, None) if player == NON_EGO else (None, other)
-    return replace(spec, places=(LearningPlace(player=player, drivers=drivers),), **changes)
+    return replace(spec, places=(LearningPlace(scene=spec.scene, player=player, drivers=drivers),), **changes)
 
 
 def in_one_go(spec: TrainingSpec, folder: Path, **options: Any) -> TrainingResult:

@@ -31,9 +31,8 @@ from harness.drivers.reference_drivers import reference_identity
 
 def stage_keys(campaign: OpenCampaign, stages: Sequence[Stage]) -> dict[str, str]:
     """Each stage's key. It covers what the stage reads itself, and the keys of the stages that it needs."""
-    scene = campaign.scene.document
     shared: dict[str, Any] = {
-        "scene": {name: campaign.hash_of(campaign.scene.folder / name) for name in scene.files},
+        "scene": campaign.hashes_of(campaign.scene),
         "ego_driver": campaign.ego_driver.identity if campaign.ego_driver is not None else "",
     }
     keys: dict[str, str] = {}
@@ -56,6 +55,8 @@ def _inputs(campaign: OpenCampaign, stage: Stage) -> dict[str, Any]:
     match stage:
         case TrainingStage():
             inputs["training"] = training_settings(document, stage).record()
+            if stage.learns_on_roads and campaign.roads:
+                inputs["roads"] = [campaign.hashes_of(each) for each in campaign.roads]
             if stage.best_known is not None:
                 inputs["regret"] = {"best_known": repr(stage.best_known), "references": reference_identity()}
         case SearchStage():

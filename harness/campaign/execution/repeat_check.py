@@ -29,7 +29,7 @@ def varying_drivers(campaign: OpenCampaign, folder: RunFolder | None = None) -> 
     words. With a run folder, what it knows already is not played."""
     file = folder.path / ".stages" / "repeats.json" if folder is not None else None
     known = _known(file) if file is not None else {}
-    scene = {name: campaign.hash_of(campaign.scene.folder / name) for name in campaign.scene.document.files}
+    scene = campaign.hashes_of(campaign.scene)
     found = {}
     for driver in (campaign.ego_driver, *campaign.other_egos.values()):
         if driver is None or driver.kind not in _CODE:

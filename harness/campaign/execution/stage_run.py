@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 from harness.campaign.plan.planned_drivers import External
-from harness.campaign.plan.stages import AssessmentStage, Stage, plays_with_errors
+from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage, plays_with_errors
 from harness.campaign.preflight import OpenCampaign
 from harness.campaign.storage.locks import held_by_worker
 from harness.campaign.storage.run_folder import RunFolder
@@ -52,6 +52,8 @@ class RunContext:
     personas: Mapping[str, Persona]
     ego_driver: ExternalDriver | None = None
     other_egos: Mapping[str, ExternalDriver] = field(default_factory=dict)
+    roads: tuple[Path, ...] = ()
+    """The folders of the scenes on whose roads the egos learn too."""
     policies: Path | None = None
     """The folder of the policies that another run trained."""
     policy_drivers: Mapping[str, ExternalDriver] = field(default_factory=dict)
@@ -73,7 +75,13 @@ class RunContext:
 
     def open_scene(self, stage: Stage) -> OpenScene:
         """The scene as a stage plays on it, with the ego's vehicle type and perception errors."""
-        scene = open_scene(self.folder.scene, self._vehicle_type(stage))
+        return self._with_errors(open_scene(self.folder.scene, self._vehicle_type(stage)), stage)
+
+    def open_roads(self, stage: TrainingStage) -> list[OpenScene]:
+        """The scenes on whose roads a training plays too."""
+        return [self._with_errors(open_scene(each), stage) for each in self.roads] if stage.learns_on_roads else []
+
+    def _with_errors(self, scene: OpenScene, stage: Stage) -> OpenScene:
         errors = self.document.ego.perception_errors if plays_with_errors(stage) else None
         return replace(scene, perception_errors=errors)
 
@@ -95,6 +103,7 @@ def run_context_of(
         personas=campaign.people,
         ego_driver=campaign.ego_driver,
         other_egos=campaign.other_egos,
+        roads=tuple(each.folder for each in campaign.roads),
         policies=campaign.policies,
         policy_drivers=campaign.policy_drivers,
         keys=keys,

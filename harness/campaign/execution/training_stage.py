@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -67,9 +68,8 @@ def carry_out_training(stage: TrainingStage, run: StageRun, scene: OpenScene) ->
 def _spec(stage: TrainingStage, run: StageRun, scene: OpenScene) -> TrainingSpec:
     context, players = run.context, PlayerFactory(context=run.context, scene=scene)
     return TrainingSpec(
-        scene=scene,
         persona=context.ego_persona if stage.learner == EGO else context.persona(stage.persona),
-        places=_places(stage, players),
+        places=(*_places(stage, players), *_places_on_roads(stage, run)),
         alone_share=stage.alone_share,
         attentive_share=stage.attentive_share,
         initial=read_policy(players.policy_folder(stage.initial)) if stage.initial is not None else None,
@@ -84,16 +84,22 @@ def _places(stage: TrainingStage, players: PlayerFactory) -> tuple[LearningPlace
     """Where the learner drives. An ego has one place. A person learns in every place of the non-egos in turn: the other
     places are driven by SUMO, which no persona has trained."""
     if stage.learner == EGO:
-        return (LearningPlace(player=EGO, drivers=(None, *players.people(stage.opponent))),)
+        return (LearningPlace(scene=players.scene, player=EGO, drivers=(None, *players.people(stage.opponent))),)
     places = []
     for learner in range(1, len(players.scene.world.roles)):
         drivers = [players.player(driver_in(stage.opponent, 0)), *players.people((SumoDriven(),))]
         drivers[learner] = None
-        places.append(LearningPlace(player=learner, drivers=tuple(drivers)))
+        places.append(LearningPlace(scene=players.scene, player=learner, drivers=tuple(drivers)))
     return tuple(places)
 
 
+def _places_on_roads(stage: TrainingStage, run: StageRun) -> Iterator[LearningPlace]:
+    for road in run.context.open_roads(stage):
+        yield from _places(stage, PlayerFactory(context=run.context, scene=road))
+
+
 def _policy_card(stage: TrainingStage, spec: TrainingSpec) -> dict[str, Any]:
+    roads = [each.scene.document.name for each in spec.places if each.scene is not spec.scene]
     return {
         "stage": stage.id,
         "player": ROLES[stage.learner],
@@ -101,6 +107,7 @@ def _policy_card(stage: TrainingStage, spec: TrainingSpec) -> dict[str, Any]:
         "persona_sha256": persona_hash(spec.persona),
         **origin_card(spec.scene.document, spec.scene.world, stage.learner),
         "people": len(spec.scene.document.non_ego),
+        **({"roads": roads} if roads else {}),
         "against": " and ".join(map(description, stage.opponent)) or None,
         "began_from": stage.initial.stage if stage.initial is not None else None,
         "training": {**spec.settings.model_dump(mode="json"), "demonstration_steps": spec.demonstration_steps},

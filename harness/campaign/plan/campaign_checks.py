@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.plan.strategy_stages import crossplay_name
 from harness.config.campaign import LEARNED, SUMO, Campaign, Rounds
 from harness.config.toml_reading import nearest
+from harness.config.training import Retraining
 from harness.config.traits import UNREAD, PersonTraits
 from harness.errors import Problem, UsageError
 from harness.evaluation.strategies import NaiveEgo, RobustEgo, strategy_name
+from harness.road.scene.open_scene import OpenScene
 
 _TAKEN = (strategy_name(NaiveEgo()), strategy_name(RobustEgo()), SUMO)
 """Names of egos that a driver of the cross-play can't have."""
@@ -26,6 +28,11 @@ _Found: TypeAlias = Iterator[tuple[str, str, str]]
 def check_people(file: Path, document: Campaign, people: int) -> None:
     """Raises UsageError for everything in a campaign that does not fit a scene with this number of people."""
     _refuse(file, _people(document, people))
+
+
+def check_roads(file: Path, document: Campaign, scene: OpenScene, roads: Sequence[OpenScene]) -> None:
+    """Raises UsageError for everything in a campaign that does not fit the `roads` on which its egos learn too."""
+    _refuse(file, _roads(document, scene, roads))
 
 
 def check_names(
@@ -63,6 +70,27 @@ def _people(document: Campaign, people: int) -> _Found:
     if document.policies is None and document.training.games < people:
         message = f"{document.training.games} games at once, and a person learns in {people} places"
         yield "training.games", message, f"give at least {people}"
+
+
+def _roads(document: Campaign, scene: OpenScene, roads: Sequence[OpenScene]) -> _Found:
+    if not roads:
+        return
+    if document.policies is not None or document.ego.driver != LEARNED:
+        yield "roads", "no ego is trained", "leave out this key, or train the ego"
+    if document.retraining.starts != Retraining().starts:
+        yield "retraining.starts", "regret is measured on one road", "leave out this key or `roads`"
+    if len(roads) >= (games := document.training.games):
+        message = f"{games} games at once, and each road needs one, that of the scene too"
+        yield "training.games", message, f"give at least {len(roads) + 1}"
+    for written, road in zip(document.roads, roads, strict=True):
+        if _game_of(road) != _game_of(scene):
+            message = f"{written!r}: its players, or the length of its steps, are not those of the scene"
+            yield "roads", message, "name scenes that `harness scene vary` made of this one"
+
+
+def _game_of(scene: OpenScene) -> tuple[Any, ...]:
+    """What all roads of a campaign have in common."""
+    return scene.world.roles, scene.world.walks.tolist(), scene.world.step_s
 
 
 def _personas(document: Campaign, personas: Sequence[str], traits: PersonTraits) -> _Found:

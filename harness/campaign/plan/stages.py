@@ -29,6 +29,7 @@ from harness.evaluation.strategies import (
     player_of,
     strategy_name,
 )
+from harness.game.roles import EGO
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,6 +137,11 @@ class TrainingStage(_Stage):
     @property
     def is_best_response(self) -> bool:
         return isinstance(self.strategy, BestResponse)
+
+    @property
+    def learns_on_roads(self) -> bool:
+        """Whether it plays on the `roads` of the campaign too. A best response is one to what is assessed."""
+        return self.learner == EGO and not self.is_best_response
 
     @property
     def learner(self) -> int:

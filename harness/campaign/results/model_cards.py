@@ -98,6 +98,8 @@ def _facts(
         yield "the same policy as", f"`{policy['selected']}`, chosen by a selection (`selections.csv`)"
     yield "persona", f"`{persona.name}`"
     yield "scene", f"`{policy['scene']}`"
+    if roads := policy.get("roads"):
+        yield "and in equal parts on the roads", ", ".join(f"`{each}`" for each in roads)
     partner = {None: "no other player", "sumo": "SUMO's own driver", "given": _given(manifest, campaign)}
     yield "against", partner.get(against, f"`{against}`")
     if isinstance(people := policy.get("people"), int) and against is not None:

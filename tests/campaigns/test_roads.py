@@ -1,0 +1,48 @@
+"""A campaign whose ego learns on other roads too, by the real command."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from harness.environments.vector_env import JoinedVecEnv
+from harness.road.scene.open_scene import open_scene
+from harness.training.training_games import LearningPlace, open_games
+from tests.support.tiny import PAPER_MERGE, finished
+from tests.support.trainings import naive_ego
+
+NAMES = ("naive", "speedy", "retrained_speedy")
+MERGE = PAPER_MERGE.parent / "merge"
+
+
+@pytest.mark.slow
+def test_campaign__its_egos_learn_on_other_roads_and_its_people_do_not() -> None:
+    run = finished(name="roads", roads=[str(MERGE)], assessment={"episodes": 2})
+    cards = {name: json.loads((run / "policies" / f"{name}-seed1" / "policy.json").read_text()) for name in NAMES}
+    assert {name: card.get("roads") for name, card in cards.items()} == {
+        "naive": ["merge"],
+        "speedy": None,
+        "retrained_speedy": ["merge"],
+    }
+    assert (
+        "| and in equal parts on the roads | `merge` |" in (run / "policies" / "naive-seed1" / "README.md").read_text()
+    )
+    hashes = json.loads((run / "manifest.json").read_text())["hashes"]
+    assert "merge.net.xml" in {Path(each).name for each in hashes}
+
+
+def test_games__of_a_training_are_in_equal_parts_on_its_roads() -> None:
+    spec = naive_ego(open_scene(PAPER_MERGE))
+    other = LearningPlace(scene=open_scene(MERGE), player=0, drivers=(None, None))
+    environment = open_games(replace(spec, places=(*spec.places, other)))
+    try:
+        assert isinstance(environment, JoinedVecEnv)
+        observed = environment.reset()
+        games = {each.arena.scene.document.name: each.num_envs for each in environment.environments}
+        assert games == {"paper_merge": 4, "merge": 4}
+        assert len(observed) == 8
+    finally:
+        environment.close()
