@@ -16,6 +16,7 @@ from benchmarks.games import GAMES, CoastingGames, merge_scene
 from benchmarks.profiler import Profiler
 from benchmarks.traffic import write_scene
 from harness.environments import arena as arena_module
+from harness.environments.knowledge import Knowledge
 from harness.game.road import Routes
 from harness.road.scene.open_scene import open_scene
 from harness.sumo.background_traffic import BackgroundTraffic
@@ -28,7 +29,7 @@ _PARTS = (
     ("players are located along their routes", "locate", Routes, "locate"),
     ("outcomes", "terminations", arena_module, "terminations"),
     ("payoffs", "payoffs", arena_module.Arena, "_payoffs"),
-    ("observations", "observe", arena_module, "observe"),
+    ("observations", "observe", Knowledge, "observations"),
     ("players that ended are removed or halted", "finish", arena_module.Arena, "_finish"),
     ("ended games are reset", "reset", CoastingGames, "reset"),
 )

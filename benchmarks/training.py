@@ -141,7 +141,10 @@ def subprocess_side(timer: LapTimer, environments: int, policy: Path) -> None:
 @contextmanager
 def _games_of(environment_of: Callable[[int], VecEnv]) -> Iterator[None]:
     """Let `train` play in another environment, made from the number of games, whose games draw their own starts."""
-    games: dict[str, Any] = {"open_games": lambda spec: environment_of(spec.settings.games), "sample": lambda *_: None}
+    games: dict[str, Any] = {
+        "open_games": lambda spec: environment_of(spec.settings.games),
+        "sample": lambda *_, **__: None,
+    }
     with patch.multiple("harness.training.ppo", **games):
         yield
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from harness.config.json_schema import DOCUMENTS
+
 SECTIONS = {
     "Tutorials": (
         "tutorials/first-campaign",
@@ -73,10 +75,7 @@ SECTIONS = {
     "Reference": (
         "reference/cli",
         "reference/api",
-        "reference/campaign",
-        "reference/scene",
-        "reference/persona",
-        "reference/driver",
+        *(f"reference/{kind}" for kind in DOCUMENTS),
         "columns",
         "publications",
     ),
