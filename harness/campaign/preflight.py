@@ -152,7 +152,7 @@ def open_campaign(
     read = [each for each in personas if each is not None]
     tunable, traits, names = _is_tunable(ego_driver), traits_of(read, baseline), [persona.name for persona in read]
     check_people(file, document, len(scene.document.non_ego))
-    check_roads(file, document, scene, opened)
+    check_roads(file, document, [_game_of(each) == _game_of(scene) for each in opened])
     check_names(file, document, names, tunable, traits)
     files, policy_drivers = list[Path](), dict[str, ExternalDriver]()
     if policies is not None and policies_exist:
@@ -213,6 +213,11 @@ def _find_named(file: Path, key: str, written: str, kind: Kind) -> Path:
 def _open_road(file: Path, written: str) -> OpenScene:
     """A scene on whose road the egos learn too. Raises UsageError if it is missing or wrong."""
     return open_scene(_find_named(file, "roads", written, "networks"))
+
+
+def _game_of(scene: OpenScene) -> tuple[Any, ...]:
+    """What all roads of a campaign have in common."""
+    return scene.world.roles, scene.world.walks.tolist(), scene.world.step_s
 
 
 def _read_persona(file: Path, key: str, written: str, files: list[Path]) -> Persona:

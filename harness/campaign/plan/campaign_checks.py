@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage
@@ -15,7 +15,6 @@ from harness.config.training import Retraining
 from harness.config.traits import UNREAD, PersonTraits
 from harness.errors import Problem, UsageError
 from harness.evaluation.strategies import NaiveEgo, RobustEgo, strategy_name
-from harness.road.scene.open_scene import OpenScene
 
 _TAKEN = (strategy_name(NaiveEgo()), strategy_name(RobustEgo()), SUMO)
 """Names of egos that a driver of the cross-play can't have."""
@@ -30,9 +29,10 @@ def check_people(file: Path, document: Campaign, people: int) -> None:
     _refuse(file, _people(document, people))
 
 
-def check_roads(file: Path, document: Campaign, scene: OpenScene, roads: Sequence[OpenScene]) -> None:
-    """Raises UsageError for everything in a campaign that does not fit the `roads` on which its egos learn too."""
-    _refuse(file, _roads(document, scene, roads))
+def check_roads(file: Path, document: Campaign, alike: Sequence[bool]) -> None:
+    """Raises UsageError for everything in a campaign that does not fit the `roads` on which its egos learn too; `alike`
+    says of each whether its players and steps are those of the scene."""
+    _refuse(file, _roads(document, alike))
 
 
 def check_names(
@@ -72,25 +72,20 @@ def _people(document: Campaign, people: int) -> _Found:
         yield "training.games", message, f"give at least {people}"
 
 
-def _roads(document: Campaign, scene: OpenScene, roads: Sequence[OpenScene]) -> _Found:
-    if not roads:
+def _roads(document: Campaign, alike: Sequence[bool]) -> _Found:
+    if not alike:
         return
     if document.policies is not None or document.ego.driver != LEARNED:
         yield "roads", "no ego is trained", "leave out this key, or train the ego"
     if document.retraining.starts != Retraining().starts:
         yield "retraining.starts", "regret is measured on one road", "leave out this key or `roads`"
-    if len(roads) >= (games := document.training.games):
+    if len(alike) >= (games := document.training.games):
         message = f"{games} games at once, and each road needs one, that of the scene too"
-        yield "training.games", message, f"give at least {len(roads) + 1}"
-    for written, road in zip(document.roads, roads, strict=True):
-        if _game_of(road) != _game_of(scene):
+        yield "training.games", message, f"give at least {len(alike) + 1}"
+    for written, is_alike in zip(document.roads, alike, strict=True):
+        if not is_alike:
             message = f"{written!r}: its players, or the length of its steps, are not those of the scene"
             yield "roads", message, "name scenes that `harness scene vary` made of this one"
-
-
-def _game_of(scene: OpenScene) -> tuple[Any, ...]:
-    """What all roads of a campaign have in common."""
-    return scene.world.roles, scene.world.walks.tolist(), scene.world.step_s
 
 
 def _personas(document: Campaign, personas: Sequence[str], traits: PersonTraits) -> _Found:
