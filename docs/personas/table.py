@@ -1,6 +1,6 @@
 """The table of docs/personas-on-the-merge.md: training, characteristic and effect of every persona of a run.
 
-    python docs/personas/table.py reports/merge-robust
+    python docs/personas/table.py reports/merge-personas
 
 reads the CSV files, traces and scene of the run folder; no game is played.
 """
@@ -224,7 +224,7 @@ def row(run: Run, persona: str) -> dict[str, str]:
 
 
 def main(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="The run folder, such as reports/merge-robust.")],
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="The run folder, such as reports/merge-personas.")],
     seed: Annotated[int, typer.Option(help="The training seed.")] = 1,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Also write the table as CSV.")] = None,
 ) -> None:

@@ -175,7 +175,7 @@ def test_main__prints_markdown_and_writes_the_same_as_csv(run: Path, capsys: pyt
 
 
 def test_characteristics__every_persona_of_the_campaign_has_one() -> None:
-    campaign = read_document(REPOSITORY / "campaigns" / "merge-robust.toml", Campaign)
+    campaign = read_document(REPOSITORY / "campaigns" / "merge-personas.toml", Campaign)
     names = {Path(file).stem for file in campaign.personas}
     assert names == set(table.CHARACTERISTICS)
     assert names <= {each.stem for each in (REPOSITORY / "personas").glob("*.toml")}
