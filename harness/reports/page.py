@@ -78,7 +78,7 @@ def render_page(
         failure_table=failure_table(tables, links),
         answers=first_answers(tables, steps),
         attribution=attribution_section(tables, links),
-        starts=start_section(tables),
+        starts=start_section(tables, links),
         next_steps=steps,
         cards=[card(persona, place, tables, links, scene, paths) for place, persona in enumerate(tables.personas, 1)],
         most_dots=MOST_DOTS if tables.episodes.groupby("arm").size().max() > MOST_DOTS else 0,

@@ -15,10 +15,10 @@ from harness.evaluation.strategies import NAIVE_VS_SUMO, against_persona
 from harness.evaluation.worst_first import worst_first
 from harness.game.arrays import FloatArray
 from harness.game.roles import MOST_PEOPLE, NON_EGO, roles_of
-from harness.reports.embedding import key
 from harness.reports.failure_table import ORDINARY
-from harness.reports.figures import GAME, INK, TONES, figure_of, svg
+from harness.reports.figures import INK, TONES, figure_of, svg
 from harness.reports.focus import focus_of
+from harness.reports.game_links import GameLinks
 from harness.reports.numbers import percent, trimmed
 from harness.reports.run_tables import RunTables
 from harness.reports.severity_wording import RISK_TONES, risk_tone
@@ -69,7 +69,7 @@ class _ShownArm:
     """The other road user in labels; empty: the ego is alone."""
 
 
-def start_section(tables: RunTables) -> list[dict[str, Any]]:
+def start_section(tables: RunTables, links: GameLinks) -> list[dict[str, Any]]:
     """What the template shows: a view for each arm, that of the first screen first. Empty where no game was played, or
     where starts differ in fewer than two quantities."""
     views: list[dict[str, Any]] = []
@@ -83,7 +83,8 @@ def start_section(tables: RunTables) -> list[dict[str, Any]]:
         starts = starts.loc[scores.index]
         if (arm.who != "") not in axes:
             axes[arm.who != ""] = list(best_pair(starts, scores.to_numpy()))
-        views.append(_view(arm, tables, starts[axes[arm.who != ""]], scores.to_numpy(), f"starts{len(views)}"))
+        shown = starts[axes[arm.who != ""]]
+        views.append(_view(arm, tables, links, shown, scores.to_numpy(), f"starts{len(views)}"))
     return views
 
 
@@ -104,7 +105,9 @@ def _arms(tables: RunTables) -> list[_ShownArm]:
     return sorted(found.values(), key=lambda arm: focus is None or arm.name != focus.arm)
 
 
-def _view(arm: _ShownArm, tables: RunTables, starts: pd.DataFrame, scores: FloatArray, name: str) -> dict[str, Any]:
+def _view(
+    arm: _ShownArm, tables: RunTables, links: GameLinks, starts: pd.DataFrame, scores: FloatArray, name: str
+) -> dict[str, Any]:
     """An arm's picture on the two axes `starts` [N, 2], one of its episodes a row."""
     worst = worst_first(tables.games_of(arm.name)).drop_duplicates("episode")
     drawn = _drawn(worst)
@@ -124,7 +127,7 @@ def _view(arm: _ShownArm, tables: RunTables, starts: pd.DataFrame, scores: Float
     points = starts.loc[drawn["episode"]].to_numpy(float)
     return {
         "label": arm.label,
-        "figure": _figure(points, drawn, kinds, boundaries, labels, name, alternative),
+        "figure": _figure(points, links.of(drawn), kinds, boundaries, labels, name, alternative),
         "sentences": sentences,
         "kinds": [(kind, _KIND_WORDS[kind]) for kind in _STYLES if (kinds == kind).any()],
         "boundaries": len(boundaries),
@@ -187,23 +190,22 @@ def _boundaries(arm: _ShownArm, tables: RunTables, axes: list[str]) -> list[Floa
 
 def _figure(
     points: FloatArray,
-    games: pd.DataFrame,
+    addresses: Sequence[str],
     kinds: pd.Series,
     boundaries: Sequence[FloatArray],
     labels: Sequence[str],
     name: str,
     alternative: str,
 ) -> Markup:
-    """A point for each game [N, 2], which leads to it; a line for each boundary [3, 2] from a failure over the mildest
-    one, a square, to a start without one."""
-    addresses = [f"{GAME}{key(game.arm, game.seed, game.episode)}" for game in games.itertuples()]
+    """A point for each game [N, 2], which leads to its address [N], if it has one; a line for each boundary [3, 2] from
+    a failure over the mildest one, a square, to a start without one."""
     with figure_of(5.6, 4.0) as figure:
         axes = figure.subplots()
         axes.grid(True, axis="both")
         for kind, style in _STYLES.items():
             at = np.flatnonzero(kinds == kind)
             if len(at):
-                axes.scatter(*points[at].T, urls=[addresses[each] for each in at], zorder=3, **style)
+                axes.scatter(*points[at].T, urls=[addresses[each] or None for each in at], zorder=3, **style)
         for boundary in boundaries:
             axes.plot(*boundary.T, color=INK, linewidth=1.0, zorder=2)
             axes.plot(*boundary[1], "s", color=INK, markersize=5, markerfacecolor="none", zorder=4)

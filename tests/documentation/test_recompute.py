@@ -13,7 +13,7 @@ from tests.support.scripts import script
 
 recompute = script("publish/recompute.py")
 REPORTS = REPOSITORY / "reports"
-MERGE = REPORTS / "merge"
+JUNCTION = REPORTS / "priority_crossing"  # its first question has a clear answer in each training
 
 
 @pytest.mark.parametrize("run", sorted(each.parent.name for each in REPORTS.glob("*/summary.csv")))
@@ -25,14 +25,14 @@ def test_published_tables__are_those_of_their_games(run: str, capsys: pytest.Cap
     ("table", "column", "where"),
     [
         ("summary", "failure_rate_high", "summary, naive_alone, seed 21, failure_rate_high"),
-        ("comparisons", "p_holm", "comparisons, RQ1 speedy, seed 21, failure, p_holm"),
-        ("attribution", "without_difference", "attribution, speedy all, seed 21, without_difference"),
+        ("comparisons", "p_holm", "comparisons, RQ1 impatient, seed 21, failure, p_holm"),
+        ("attribution", "without_difference", "attribution, impatient all, seed 21, without_difference"),
     ],
 )
 def test_cell__that_the_games_do_not_give_is_found(
     table: str, column: str, where: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    run = shutil.copytree(MERGE, tmp_path / "merge", ignore=shutil.ignore_patterns("traces", "replays", "policies"))
+    run = shutil.copytree(JUNCTION, tmp_path / "junction", ignore=shutil.ignore_patterns("traces", "replays", "policies"))
     cells = pd.read_csv(run / f"{table}.csv")
     cells.loc[0, column] += 0.001
     cells.to_csv(run / f"{table}.csv", index=False)

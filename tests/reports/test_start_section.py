@@ -9,16 +9,22 @@ import pytest
 
 from harness.evaluation.start_space import Boundary
 from harness.reports import start_section as section
+from harness.reports.embedding import key
+from harness.reports.game_links import GameLinks
 from harness.reports.run_tables import RunTables
 from tests.support.pages import GAMES, blank_figures, campaign, plain, starts
 
 ARM = "naive_vs_speedy"
 
 
-def sections(drawn: pd.DataFrame, boundaries: tuple[Boundary, ...] = (), **arguments):
+def sections(drawn: pd.DataFrame, boundaries: tuple[Boundary, ...] = (), left_out: tuple[int, ...] = (), **arguments):
+    """The section of a page that contains all games but those of the episodes `left_out`."""
     never = {"sumo": 0.0, "retrained": 0.0}
     made = campaign(**{"personas": ["speedy"], "games": len(drawn), "failing": never, **arguments})
-    return section.start_section(RunTables(**made, starts=drawn, boundaries=boundaries))
+    tables = RunTables(**made, starts=drawn, boundaries=boundaries)
+    games = tables.episodes[~tables.episodes["episode"].isin(left_out)]
+    embedded = set(map(key, games["arm"], games["seed"], games["episode"]))
+    return section.start_section(tables, GameLinks(embedded=embedded, episodes=tables.episodes))
 
 
 @pytest.fixture(scope="module")
@@ -42,6 +48,13 @@ def test_figure__has_a_link_for_each_start_and_the_quantity_that_decides(naive):
     assert sorted(map(int, links)) == list(range(GAMES))
     assert ">speedy ahead of the ego (m)</text>" in naive["figure"]
     assert [kind for kind, _ in naive["kinds"]] == ["fine", "unknown"]  # made-up failures have no known risk
+
+
+def test_figure__a_start_whose_game_the_page_does_not_contain_has_no_link():
+    figure = sections(starts(), left_out=(0, 5))[0]["figure"]
+    links = re.findall(rf'<a href="#game={ARM},1,(\d+)">', figure)
+    assert sorted(map(int, links)) == [each for each in range(GAMES) if each not in (0, 5)]
+    assert figure.count("<use ") >= GAMES, "it is drawn all the same"
 
 
 def test_section__says_where_failures_lie_and_what_nearby_starts_tell(naive):
