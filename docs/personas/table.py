@@ -140,8 +140,10 @@ class Run:
     scene: OpenScene
 
     @classmethod
-    def read(cls, folder: Path, seed: int) -> Run:
+    def read(cls, folder: Path, seed: int | None) -> Run:
+        """The games of a training seed; None: of the first one."""
         episodes, training = (pd.read_csv(folder / f"{name}.csv") for name in ("episodes", "training"))
+        seed = int(episodes["seed"].min()) if seed is None else seed
         return cls(
             folder=folder,
             seed=seed,
@@ -225,7 +227,7 @@ def row(run: Run, persona: str) -> dict[str, str]:
 
 def main(
     run: Annotated[Path, typer.Argument(metavar="RUN", help="The run folder, such as reports/merge-personas.")],
-    seed: Annotated[int, typer.Option(help="The training seed.")] = 1,
+    seed: Annotated[int | None, typer.Option(help="The training seed.  [default: the first one]")] = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Also write the table as CSV.")] = None,
 ) -> None:
     """Print the table of personas as Markdown. The cells of an ego have its failure rate and its mean speed."""

@@ -32,7 +32,9 @@ def test_published_tables__are_those_of_their_games(run: str, capsys: pytest.Cap
 def test_cell__that_the_games_do_not_give_is_found(
     table: str, column: str, where: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    run = shutil.copytree(JUNCTION, tmp_path / "junction", ignore=shutil.ignore_patterns("traces", "replays", "policies"))
+    run = shutil.copytree(
+        JUNCTION, tmp_path / "junction", ignore=shutil.ignore_patterns("traces", "replays", "policies")
+    )
     cells = pd.read_csv(run / f"{table}.csv")
     cells.loc[0, column] += 0.001
     cells.to_csv(run / f"{table}.csv", index=False)
