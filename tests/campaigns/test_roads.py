@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.environments.vector_env import JoinedVecEnv
+from harness.game.roles import EGO
 from harness.road.scene.open_scene import open_scene
 from harness.training.training_games import LearningPlace, open_games
 from tests.support.tiny import PAPER_MERGE, finished
@@ -36,10 +36,9 @@ def test_campaign__its_egos_learn_on_other_roads_and_its_people_do_not() -> None
 
 def test_games__of_a_training_are_in_equal_parts_on_its_roads() -> None:
     spec = naive_ego(open_scene(PAPER_MERGE))
-    other = LearningPlace(scene=open_scene(MERGE), player=0, drivers=(None, None))
+    other = LearningPlace(scene=open_scene(MERGE), player=EGO, drivers=(None, None))
     environment = open_games(replace(spec, places=(*spec.places, other)))
     try:
-        assert isinstance(environment, JoinedVecEnv)
         observed = environment.reset()
         games = {each.arena.scene.document.name: each.num_envs for each in environment.environments}
         assert games == {"paper_merge": 4, "merge": 4}
