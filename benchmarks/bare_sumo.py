@@ -19,7 +19,7 @@ import traci
 from sumolib.miscutils import getFreeSocketPort
 
 from benchmarks.games import CoastingGames
-from harness.road.net.tiles import tile_offset_m, tile_prefix, tiled_net
+from harness.road.net.tiles import Copies, tiled_net, tiles_of
 from harness.road.scene.open_scene import OpenScene
 
 KEEP_ROUTE = 2  # of moveToXY: place the vehicle exactly as given, on the road or off it
@@ -37,14 +37,15 @@ def _step_and_read(coasting: CoastingGames, reset_ended: bool) -> list[Placement
     coasting.step(reset_ended)
     arena = coasting.arena
     state, games = arena.state, arena.games
-    offset_m = tile_offset_m(arena.scene.net_file, games) * np.arange(games)[:, None]
+    [tiles] = tiles_of([Copies(arena.scene.net_file, games)])
+    offset_m = np.array([tile.offset_m for tile in tiles])[:, None]
     half_m = 0.5 * arena.world.length_m
     x = (state.x_m + half_m * np.cos(state.heading_rad)).tolist()
     y = (state.y_m + half_m * np.sin(state.heading_rad) + offset_m).tolist()
     angle = ((90.0 - np.degrees(state.heading_rad)) % 360.0).tolist()
     return [
-        (tile_prefix(game, games) + role, x[game][player], y[game][player], angle[game][player])
-        for game in range(games)
+        (tile.prefix + role, x[game][player], y[game][player], angle[game][player])
+        for game, tile in enumerate(tiles)
         for player, role in enumerate(arena.world.roles)
     ]
 
@@ -66,14 +67,15 @@ def start_bare_sumo(scene: OpenScene, games: int, by_socket: bool = False) -> It
     with tempfile.TemporaryDirectory(prefix="benchmark-") as folder:
         types = Path(folder) / "types.rou.xml"
         types.write_text(scene.routes.types_xml, encoding="utf-8")
+        [tiles] = tiles_of([Copies(scene.net_file, games)])
         options = [
-            *("--net-file", str(tiled_net(scene.net_file, games)), "--route-files", str(types)),
+            *("--net-file", str(tiled_net(tiles)), "--route-files", str(types)),
             *("--step-length", str(scene.world.step_s), "--collision.action", "none"),
             *("--time-to-teleport", "-1", "--no-step-log", "--no-warnings", "--xml-validation", "never"),
         ]
         with _behind_socket(options) if by_socket else _in_process(options) as api:
-            for game, (player, role) in itertools.product(range(games), enumerate(scene.world.roles)):
-                prefix = tile_prefix(game, games)
+            for tile, (player, role) in itertools.product(tiles, enumerate(scene.world.roles)):
+                prefix = tile.prefix
                 api.route.add(f"{prefix}route {role}", [prefix + edge for edge in scene.edges[player]])
                 lane = (scene.document.players[player].lane or "_0").rsplit("_", 1)[1]
                 kind = scene.vehicle(player).vehicle_type

@@ -71,7 +71,8 @@ def _time_parts(coasting: CoastingGames, seconds: float, steps_per_pass: int, re
     for _, part, owner, name in _PARTS:
         setattr(owner, name, profiler.wrap(part, getattr(owner, name)))
     simulation: Any = coasting.arena.simulation
-    simulation.step = profiler.wrap("simulation", simulation.step)
+    for name in ("place", "step"):
+        setattr(simulation, name, profiler.wrap("simulation", getattr(simulation, name)))
     step = profiler.wrap("rest", lambda: coasting.step(reset_ended))
     steps, end_s = 0, time.perf_counter() + seconds
     while time.perf_counter() < end_s:

@@ -22,9 +22,11 @@ from harness.training.ppo import train
 
 _WARM_UP_STEPS = 20_000
 _PARTS = (
+    ("SUMO: placements, its step, readings", LibsumoSimulation, "place"),
     ("SUMO: placements, its step, readings", LibsumoSimulation, "step"),
     ("the opponent's policy", LearnedDriver, "decide"),
-    ("the rest of the arena's step", Arena, "step"),
+    ("the rest of the arena's step", Arena, "place"),
+    ("the rest of the arena's step", Arena, "advance"),
     ("ended games are reset", AutoReset, "reset"),
     ("the learner's policy in the rollout", compiled_ppo._ActorCritic, "sample"),
     ("the rest of the rollout: buffer, advantages, callbacks", compiled_ppo.CompiledPPO, "collect_rollouts"),

@@ -182,7 +182,10 @@ class RecordedCourses:
     def remove(self, game: int, player: int) -> None:
         """Do nothing: the arena leaves a player that has ended out."""
 
-    def step(self, x_m: FloatArray, y_m: FloatArray, heading_rad: FloatArray) -> Reading:
+    def place(self, x_m: FloatArray, y_m: FloatArray, heading_rad: FloatArray) -> None:
+        """Do nothing: nobody reacts to the players."""
+
+    def step(self) -> Reading:
         """Advance all games by one step; at the end of a course its last step is repeated."""
         last = np.array([len(each.course.players) - 1 for each in self._replays])
         self._clock = np.minimum(self._clock + 1, last)

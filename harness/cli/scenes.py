@@ -215,11 +215,11 @@ def vary_scene(
     traffic and right of way are those of the scene. A road that a rule-based driver can't drive is drawn again.
     """
     from harness.cli.scene_varying import check_variable, words_of, write_variant
+    from harness.files import make_folder
     from harness.road.scene.open_scene import open_scene
 
     scene, seeds = open_scene(folder_of_scene(document_at(path, "networks")) or path), range(seed, seed + roads)
-    if not out.is_dir():
-        raise UsageError.of("--out", str(out), *messages.no_folder(out))
+    make_folder(out)
     check_variable(scene, seeds, out)
     console, folders = console_of_any_encoding(), []
     for each in seeds:

@@ -10,14 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NoReturn
+from typing import NamedTuple
 
 import numpy as np
 
 from harness.environments.cartesian_views import CartesianViews, Sights
 from harness.environments.knowledge import Knowledge
+from harness.environments.live_simulation import LiveSimulation
 from harness.environments.nearby_bodies import NearbyBodies
-from harness.environments.seats import Seat, with_walkers
+from harness.environments.seats import Seat, taken_over, with_walkers
 from harness.environments.sumo_players import read_signals, read_sumo_players
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.bicycle import Requested, along_rail, move, requests, slide
@@ -31,22 +32,11 @@ from harness.game.state import State, terminations
 from harness.game.walking import walk
 from harness.road.demand.route_file import Departure
 from harness.road.scene.open_scene import OpenScene
+from harness.sumo.scene_games import SceneGames
 from harness.sumo.simulation import Reading, Simulation, with_game
-from harness.sumo.subprocess_simulation import open_simulation
+from harness.sumo.subprocess_simulation import open_simulations
 
-
-class LiveSimulation:
-    """An environment that holds a running SUMO simulation, which is neither pickled nor copied."""
-
-    def __reduce_ex__(self, protocol: Any) -> NoReturn:
-        """Raises TypeError: `pickle`, `copy` and `cloudpickle` ask for this."""
-        raise TypeError(
-            f"{type(self).__name__} holds a running SUMO simulation and can't be pickled or copied: pass on a function "
-            "that makes it, such as lambda: gymnasium.make('harness:harness/Ego-v0'), and call that where it is needed"
-        )
-
-
-__all__ = ["Arena", "LiveSimulation", "Seat", "Step"]
+__all__ = ["Arena", "Seat", "Step"]
 
 # comparing arrays with members of an enumeration is slower
 _RUNNING, _GOAL = int(Outcome.RUNNING), int(Outcome.GOAL)
@@ -62,6 +52,14 @@ class Step:
     """Whether the player was still driving when the step began."""
     quantities: Quantities
     """At the end of the step, before a player is removed."""
+
+
+class _Placed(NamedTuple):
+    """What a step knows of the time before it."""
+
+    before: State
+    drove: BoolArray
+    sliding: BoolArray
 
 
 class Arena(LiveSimulation):
@@ -92,13 +90,13 @@ class Arena(LiveSimulation):
         self.seats = tuple((each,) if isinstance(each, Seat) else tuple(each) for each in seats)
         if simulation is None:
             self.seats = with_walkers(self.seats, scene.world)
-        first_drivers = [of_player[0].driver for of_player in self.seats]
-        self._learns = np.array([driver is None for driver in first_drivers])
-        self._taken_over = np.array([driver is None or driver.takes_over for driver in first_drivers])
+        self._learns = np.array([of_player[0].driver is None for of_player in self.seats])
+        self._taken_over = np.array(taken_over(self.seats))
         self._on_wheels = self._taken_over & ~self.world.walks
-        self.simulation = simulation or open_simulation(
-            scene, games, taken_over=self._taken_over.tolist(), seed=seed, recorded=recorded
-        )
+        if simulation is None:
+            own = SceneGames(scene=scene, games=games, taken_over=taken_over(self.seats), recorded=recorded)
+            [simulation] = open_simulations([own], seed=seed)
+        self.simulation = simulation
         players = len(self.seats)
         self.state = State.empty(games, players, len(self.world.right_of_way.signal_links))
         self.observation: FloatArray = np.zeros((games, players, SIZE), dtype=np.float32)
@@ -154,6 +152,12 @@ class Arena(LiveSimulation):
 
         Raises ImpossibleNumber if a number is impossible (`game.sanity_checks`), SimulationError if SUMO fails.
         """
+        self.place(actions)
+        return self.advance()
+
+    def place(self, actions: FloatArray | None = None) -> None:
+        """The first half of `step`: the players decide and move. Arenas whose simulations share a SUMO do this before
+        one of them goes on. Raises as `step` does."""
         before = self.state
         state = self.state = before.copy()  # the quantities of the step before refer to the old state
         drove = state.running
@@ -166,7 +170,14 @@ class Arena(LiveSimulation):
         sliding = self._sliding(drove)
         if sliding.any():
             slide(state, sliding, self._course_rad, world.step_s)
-        reading = self.reading = self.simulation.step(state.x_m, state.y_m, state.heading_rad)
+        self.simulation.place(state.x_m, state.y_m, state.heading_rad)
+        self._placed = _Placed(before, drove, sliding)
+
+    def advance(self) -> Step:
+        """The second half of `step`: SUMO's step, and what follows from it. Raises as `step` does."""
+        before, drove, sliding = self._placed
+        state, world = self.state, self.world
+        reading = self.reading = self.simulation.step()
         read_signals(state, before, reading, world.step_s)
         self.signal_texts = list(reading.signal_texts or self.signal_texts)
         read_sumo_players(state, reading, drove=drove, taken_over=self._taken_over, step_s=world.step_s)

@@ -15,7 +15,8 @@ from gymnasium.utils import seeding
 from pettingzoo import ParallelEnv
 
 from harness.drivers.policy_file import ACTIONS
-from harness.environments.arena import LiveSimulation, Seat
+from harness.environments.arena import Seat
+from harness.environments.live_simulation import LiveSimulation
 from harness.environments.seats import PERSONA, SCENE, Place, opened_scene, read_persona, seating_of
 from harness.environments.single_game import RENDER_MODES, Info, SingleGame, space_of
 from harness.errors import UsageError

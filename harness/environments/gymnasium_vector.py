@@ -10,8 +10,9 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from harness.drivers.policy_file import ACTIONS
-from harness.environments.arena import Arena, LiveSimulation
+from harness.environments.arena import Arena
 from harness.environments.auto_reset import AutoReset
+from harness.environments.live_simulation import LiveSimulation
 from harness.environments.seats import PERSONA, SCENE, Place, seating_of
 from harness.environments.single_game import checked_actions, numbers_of
 from harness.environments.vector_env import ACTION_SPACE, OBSERVATION_SPACE, ArenaVecEnv

@@ -58,6 +58,12 @@ def with_walkers(seats: Sequence[Sequence[Seat]], world: World) -> tuple[tuple[S
     return tuple(tuple(seated(seat, player) for seat in of_player) for player, of_player in enumerate(seats))
 
 
+def taken_over(seats: Sequence[Sequence[Seat]]) -> tuple[bool, ...]:
+    """[P] whether the harness drives a player with these seats [P][n]. SUMO drives all seats of a player or none."""
+    drivers = (of_player[0].driver for of_player in seats)
+    return tuple(driver is None or driver.takes_over for driver in drivers)
+
+
 SCENE, PERSONA = "merge", "careful"
 
 Place: TypeAlias = str | Path

@@ -13,8 +13,9 @@ import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
 
 from harness.drivers.policy_file import ACTIONS
-from harness.environments.arena import Arena, LiveSimulation
+from harness.environments.arena import Arena
 from harness.environments.auto_reset import AutoReset, Replays
+from harness.environments.live_simulation import LiveSimulation
 from harness.environments.single_game import space_of
 from harness.game.arrays import FloatArray
 from harness.game.initial_state import StartDistribution
@@ -120,7 +121,16 @@ class ArenaVecEnv(GamesVecEnv):
 
         Raises as `Arena.step` does.
         """
-        step = self.arena.step(self._actions)
+        self.place()
+        return self.advance()
+
+    def place(self) -> None:
+        """The first half of `step_wait` (`Arena.place`)."""
+        self.arena.place(self._actions)
+
+    def advance(self) -> tuple[FloatArray, FloatArray, Any, list[dict[str, Any]]]:
+        """The second half of `step_wait` (`Arena.advance`)."""
+        step = self.arena.advance()
         payoff = step.payoff[:, self.learner].astype(np.float32)
         self._payoff += payoff
         done = ~self.arena.state.running[:, self.learner]
@@ -164,15 +174,21 @@ class JoinedVecEnv(GamesVecEnv):
         super().__init__(sum(games), OBSERVATION_SPACE, ACTION_SPACE)
         self._cuts = np.cumsum(games)[:-1]
 
+    def split(self, of_games: np.ndarray) -> list[np.ndarray]:
+        """The values [G, ...] of all games, for each environment."""
+        return np.split(of_games, self._cuts)
+
     def reset(self) -> FloatArray:
         return np.concatenate([each.reset() for each in self.environments])
 
     def step_async(self, actions: FloatArray) -> None:
-        for each, own in zip(self.environments, np.split(actions, self._cuts), strict=True):
+        for each, own in zip(self.environments, self.split(actions), strict=True):
             each.step_async(own)
 
     def step_wait(self) -> tuple[FloatArray, FloatArray, Any, list[dict[str, Any]]]:
-        steps = [each.step_wait() for each in self.environments]
+        for each in self.environments:
+            each.place()
+        steps = [each.advance() for each in self.environments]
         observation, payoff, done = (np.concatenate([step[part] for step in steps]) for part in range(3))
         return observation, payoff, done, [info for step in steps for info in step[3]]
 

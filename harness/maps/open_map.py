@@ -22,7 +22,7 @@ from harness.maps.map_traffic import read_traffic
 from harness.road.demand.route_file import RouteFile
 from harness.road.net.net_listing import ListedJunction, ListedLane, edges_near, listed_junctions, listed_lane
 from harness.road.net.network import car_lanes, junctions_near, lane_line
-from harness.road.net.tiles import write_tiles
+from harness.road.net.tiles import Tile, write_tiles
 from harness.road.xml.xml_file import number_of, parse_xml
 
 _STOPS = {letter for letter, signal in SIGNALS.items() if signal in (Signal.YELLOW, Signal.RED)}
@@ -135,7 +135,7 @@ def write_part(
     if junctions is None:
         shutil.copyfile(net_file, file)
         return None
-    write_tiles(net_file, file, prefixes=[""], offset_m=0.0, junctions=junctions)
+    write_tiles([Tile(net_file=net_file, junctions=junctions)], file)
     root = parse_xml(file)
     location = root.find("location")
     if location is not None:

@@ -45,7 +45,8 @@ class BackgroundPeople:
         name, edges = prefix + person.name, [prefix + edge for edge in person.edges]
         begin_m, end_m = _metres(edges[0], person.position), _metres(edges[-1], person.arrival[1])
         speed_mps = float(person.speed) if person.speed else _AS_ITS_TYPE
-        libsumo.person.add(name, edges[0], begin_m, depart=libsumo.simulation.getTime(), typeID=person.vehicle_type)
+        person_type = self._tiles.types.in_sumo(person.vehicle_type)
+        libsumo.person.add(name, edges[0], begin_m, depart=libsumo.simulation.getTime(), typeID=person_type)
         libsumo.person.appendWalkingStage(name, edges, arrivalPos=end_m, speed=speed_mps)
         if person.speed_factor is not None:
             libsumo.person.setSpeedFactor(name, person.speed_factor)
@@ -65,7 +66,7 @@ class BackgroundPeople:
                 game, person = self.inserted[name], libsumo.person
                 plain = name[len(self._tiles.prefixes[game]) :]
                 size_m = person.getLength(name), person.getWidth(name)
-                self._on_road[name] = _Person(game, plain, person.getTypeID(name), *size_m)
+                self._on_road[name] = _Person(game, plain, self._tiles.types.plain(person.getTypeID(name)), *size_m)
 
     def read(self, players: Players) -> Reading:
         """The persons near a player, or all persons if games are recorded."""

@@ -110,9 +110,10 @@ class BackgroundTraffic:
         due = self._table.due
         for name in _libsumo.simulation_getArrivedIDList():
             place = self._places.pop(name, None)
-            if place is None:
+            if place is not None:
+                due[place] = _NEVER
+            elif self._tiles.has(name):
                 raise SimulationError(f"SUMO removed player {name!r} from the traffic")
-            due[place] = _NEVER
         if self._places:
             for name in _libsumo.simulation_getDepartedIDList():
                 if name in self._places:

@@ -24,6 +24,7 @@ from harness.road.scene.following import FOLLOWER_XML
 from harness.road.scene.open_obstacles import blockages
 from harness.road.scene.open_scene import OpenScene
 from harness.road.xml.xml_file import number_of
+from harness.sumo.simulation import TypeNames
 
 CLEAR_M, CLEAR_S, CLEAR_AROUND_M = 10.0, 2.0, 2.0
 """Room at a player's start: no vehicle on its lane nearer than the first or than the way that the one behind drives in
@@ -40,7 +41,8 @@ _WITHOUT_END = -1073741824.0  # SUMO's double for a value that is not given
 class Insertion:
     """Adds vehicles to the traffic of one loaded simulation. Each route is declared once."""
 
-    def __init__(self) -> None:
+    def __init__(self, types: TypeNames) -> None:
+        self._types = types
         self._routes: set[str] = set()
 
     def add(
@@ -64,7 +66,7 @@ class Insertion:
         libsumo.vehicle.add(
             name,
             route,
-            vehicle_type,
+            self._types.in_sumo(vehicle_type),
             depart="now",
             departLane=lane,
             departPos=position,

@@ -1,4 +1,4 @@
-"""The SUMO simulation of this process. libsumo allows one per process.
+"""A SUMO simulation in this process.
 
 A player that the harness drives is placed with moveToXY, exactly at the arena's pose, on the road or off it. A player
 that SUMO drives is inserted here, and its state is read back. This module converts headings to SUMO's angles, and the
@@ -13,14 +13,10 @@ for the players' lanes along their routes only.
 
 from __future__ import annotations
 
-import contextlib
-import tempfile
-import weakref
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import repeat
-from pathlib import Path
 
 import libsumo
 import numpy as np
@@ -31,14 +27,10 @@ from harness.game.arrays import FloatArray
 from harness.game.initial_state import InitialState
 from harness.game.roles import EGO
 from harness.road.demand.route_file import Departure
-from harness.road.demand.warm_up import LANE_CHANGE_S
-from harness.road.net.tiles import tile_offset_m, tile_prefix, tiled_net
 from harness.road.scene.following import NO_ROAD
-from harness.road.scene.open_scene import OpenScene
 from harness.road.xml.angles import compass_deg_of, heading_rad_of
 from harness.sumo.background_traffic import BackgroundTraffic
 from harness.sumo.insertion import (
-    TYPES_XML,
     Insertion,
     StandingVehicles,
     clear_of_obstacles,
@@ -46,7 +38,9 @@ from harness.sumo.insertion import (
     drive_as,
     with_follower,
 )
+from harness.sumo.loaded_sumo import LoadedSumo
 from harness.sumo.road_signals import Signals, SpeedLimits
+from harness.sumo.scene_games import SceneGames
 from harness.sumo.simulation import NO_SIGNALS, TURN_SIGNALS, AtReset, Reading, Simulation, Tiles
 
 # Options of moveToXY: keepRoute, and the distance within which SUMO looks for a lane. keepRoute's bit 2 places the car
@@ -55,81 +49,44 @@ _ON_ANY_LANE = (2, 100.0)  # SUMO's default distance
 _ON_ITS_ROUTE = (2 | 1, 10.0)
 _ANY_EDGE, _ANY_LANE = repeat(""), repeat(-1)
 _NO_ACTIONS_S = 1e6  # an action step longer than any game: disables SUMO's driver model for a car
-_LATERAL_RESOLUTION_M = 0.8  # as in SUMO's documentation of the sublane model: a quarter of a lane
 _ANY_SPEED = 100.0  # a speed factor: other vehicles see at most the speed limit times this
 
 
 class LibsumoSimulation(Simulation):
-    """The SUMO simulation of this process. `close`, or the end of this object, releases libsumo."""
+    """A SUMO simulation in this process, alone or beside others (`side_by_side`). `close`, or the end of this object
+    and those beside it, releases libsumo."""
 
     @staticmethod
     def in_use() -> bool:
         """Whether libsumo is in use in this process, by the harness or by other code."""
         return libsumo.isLoaded()
 
-    def __init__(
-        self, scene: OpenScene, games: int, taken_over: Sequence[bool], seed: int, *, recorded: bool = False
-    ) -> None:
-        """Load SUMO with a tile for each game. Raises SimulationError if SUMO refuses or is in use.
+    @classmethod
+    def side_by_side(cls, parts: Sequence[SceneGames], seed: int) -> list[LibsumoSimulation]:
+        """Load SUMO with the games of several simulations that can share it (`can_share`). Before one of them is
+        stepped, all have placed their players; to close one is to close all.
 
-        The arguments are those of `open_simulation`.
+        Raises SimulationError if SUMO refuses or is in use.
         """
-        if self.in_use():
-            raise SimulationError("this process has a libsumo simulation already")
-        self._scene, self._games, self._taken_over = scene, games, tuple(taken_over)
-        self._recorded = recorded
-        # whether SUMO drives no vehicle, but one that may follow the ego
-        self._alone = all(self._taken_over) and not scene.has_background_traffic
-        self._move_options = _ON_ITS_ROUTE if self._alone else _ON_ANY_LANE
-        self._half_length = 0.5 * scene.world.length_m
-        self._tiles = Tiles(
-            prefixes=[tile_prefix(game, games) for game in range(games)],
-            offsets_m=tile_offset_m(scene.net_file, games) * np.arange(games),
-            roads_m=scene.roads_m,
-        )
-        folder = tempfile.TemporaryDirectory(prefix="harness-sumo-")
-        types = Path(folder.name) / "types.rou.xml"
-        types.write_text(scene.routes.types_xml.replace("</routes>", f"{TYPES_XML}</routes>"), encoding="utf-8")
-        document = scene.document
-        # SUMO 1.28 may crash (SIGSEGV) if a placed car leaves a junction's lanes and lane changes take time: they take
-        # time only if SUMO drives a vehicle that changes lanes.
-        duration_s = 0.0 if self._alone else LANE_CHANGE_S
-        lateral = ["--lanechange.duration", str(duration_s)]
-        if self._needs_sublanes():
-            lateral = ["--lateral-resolution", str(_LATERAL_RESOLUTION_M)]  # SUMO accepts one of the two options
-        self._options = [
-            *("--net-file", str(tiled_net(scene.net_file, games, scene.junctions)), "--route-files", str(types)),
-            *("--step-length", str(document.step_length_s), "--collision.action", "none"),
-            *lateral,
-            *("--time-to-teleport", "-1", "--no-step-log", "--no-warnings", "--xml-validation", "never"),
-        ]
-        self._release = weakref.finalize(self, _release, folder)
+        sumo = LoadedSumo(parts, seed)
         try:
-            self._load(["sumo", *self._options, "--seed", str(seed)], libsumo.start)
+            return [cls(games, sumo, tiles) for games, tiles in zip(parts, sumo.tiles, strict=True)]
         except SimulationError:
-            self.close()
+            sumo.close()
             raise
 
-    def _needs_sublanes(self) -> bool:
-        """Whether a player that SUMO drives has the lane-change model SL2015, which requires sublanes."""
-        types = self._scene.routes.types
-        driven = [player for player, taken_over in enumerate(self._taken_over) if not taken_over]
-        return any(types[self._scene.vehicle(player).vehicle_type].lane_changes == "SL2015" for player in driven)
+    def __init__(self, games: SceneGames, sumo: LoadedSumo, tiles: Tiles) -> None:
+        self._scene, self._games, self._taken_over = games.scene, games.games, games.taken_over
+        self._recorded, self._alone = games.recorded, games.alone
+        self._sumo, self._tiles = sumo, tiles
+        self._move_options = _ON_ITS_ROUTE if self._alone else _ON_ANY_LANE
+        self._half_length = 0.5 * games.scene.world.length_m
+        self._begin()
 
-    @contextlib.contextmanager
-    def _calls(self, action: str) -> Iterator[None]:
-        """A block of calls: libsumo's errors in it become a SimulationError that names the action."""
-        if not self._release.alive:
-            raise SimulationError(f"SUMO can't {action}: this simulation was closed")
-        try:
-            yield
-        except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
-            raise SimulationError(f"SUMO could not {action}: {error}") from error
-
-    def _load(self, options: list[str], load: Callable[[list[str]], object]) -> None:
-        with self._calls(f"load scene {self._scene.document.name!r}"):
-            load(options)
-        self._traffic = Insertion()
+    def _begin(self) -> None:
+        """Begin with the traffic that SUMO has loaded."""
+        self._loads, self._steps = self._sumo.loads, self._sumo.steps
+        self._traffic = Insertion(self._tiles.types)
         self._placed: dict[str, int] = {}  # players placed by the arena, by name in SUMO: index in a flat [G, P]
         self._sumo_driven: dict[str, tuple[int, int]] = {}  # players that SUMO drives: game and player
         self._present = np.zeros((self._games, len(self._taken_over)), dtype=bool)
@@ -146,10 +103,12 @@ class LibsumoSimulation(Simulation):
         )
 
     def reload(self, seed: int) -> None:
-        self._load([*self._options, "--seed", str(seed)], libsumo.load)
+        if self._loads == self._sumo.loads:  # none of the simulations beside it has been reloaded yet
+            self._sumo.reload(seed)
+        self._begin()
 
     def reset(self, game: int, start: InitialState, departures: list[Departure]) -> AtReset:
-        with self._calls(f"reset game {game}"):
+        with self._sumo.calls(f"reset game {game}"):
             length_m = self._scene.world.length_m
             departures = clear_of_players(departures, start, length_m)
             follower = self._scene.road_behind.follower(start, length_m[EGO])
@@ -181,7 +140,7 @@ class LibsumoSimulation(Simulation):
     def remove(self, game: int, player: int) -> None:
         """Remove a player from the traffic. If SUMO drives no vehicle of its game, it stays until the next reset."""
         if not self._players_only[game]:
-            with self._calls(f"remove a player from game {game}"):
+            with self._sumo.calls(f"remove a player from game {game}"):
                 self._remove_vehicle(game, player)
 
     def _remove_vehicle(self, game: int, player: int) -> None:
@@ -191,17 +150,25 @@ class LibsumoSimulation(Simulation):
         self._sumo_driven.pop(name, None)
         self._placed.pop(name, None)
 
-    def step(self, x_m: FloatArray, y_m: FloatArray, heading_rad: FloatArray) -> Reading:
+    def place(self, x_m: FloatArray, y_m: FloatArray, heading_rad: FloatArray) -> None:
+        self._poses = x_m, y_m
         seats = np.fromiter(self._placed.values(), np.int64, len(self._placed))
         in_tiles_y_m = y_m + self._half_length * np.sin(heading_rad) + self._tiles.offsets_m[:, None]
         front_x = (x_m + self._half_length * np.cos(heading_rad)).ravel()[seats].tolist()
         front_y = in_tiles_y_m.ravel()[seats].tolist()
         angle = compass_deg_of(heading_rad).ravel()[seats].tolist()
-        with self._calls("step"):
+        with self._sumo.calls("step"):
             targets = (_ANY_EDGE, _ANY_LANE, front_x, front_y, angle, *map(repeat, self._move_options))
             deque(map(_libsumo.vehicle_moveToXY, self._placed, *targets), maxlen=0)  # faster than a loop
-            _libsumo.simulation_step()
+        self._sumo.placed += 1
+
+    def step(self) -> Reading:
+        with self._sumo.calls("step"):
+            if self._steps == self._sumo.steps:  # none of the simulations beside it has been stepped yet
+                self._sumo.step()
+            self._steps += 1
             self._background.advance()
+            x_m, y_m = self._poses
             players = self._read_players()
             if players is not None:
                 x_m = np.where(np.isnan(players[..., 0]), x_m, players[..., 0])
@@ -213,12 +180,12 @@ class LibsumoSimulation(Simulation):
             return replace(reading, players=players, signals=self._signals.read(), signal_texts=texts)
 
     def turn_signals(self, vehicles: Sequence[tuple[int, str]]) -> list[str]:
-        with self._calls("read turn signals"):
+        with self._sumo.calls("read turn signals"):
             codes = (libsumo.vehicle.getSignals(self._tiles.prefixes[game] + name) for game, name in vehicles)
             return [TURN_SIGNALS[code % len(TURN_SIGNALS)] for code in codes]
 
     def close(self) -> None:
-        self._release()
+        self._sumo.close()
 
     def _name(self, game: int, player: int) -> str:
         return self._tiles.prefixes[game] + self._scene.world.roles[player]
@@ -264,8 +231,9 @@ class LibsumoSimulation(Simulation):
         desired = self._scene.routes.types[vehicle_type].desired_speed_mps
         lane = self._scene.document.players[player].lane
         legal = float(routes.speed_limit_mps[routes.first_row[player]])
-        obeyed = min(legal, desired) * min(1.0, types.getSpeedFactor(vehicle_type))
-        return vehicle_type, lane and lane.rsplit("_", 1)[1], float(min(obeyed, types.getMaxSpeed(vehicle_type)))
+        in_sumo = self._tiles.types.in_sumo(vehicle_type)
+        obeyed = min(legal, desired) * min(1.0, types.getSpeedFactor(in_sumo))
+        return vehicle_type, lane and lane.rsplit("_", 1)[1], float(min(obeyed, types.getMaxSpeed(in_sumo)))
 
     def _read_players(self) -> FloatArray | None:
         """[G, P, 4] x_m, y_m, heading_rad and speed_mps of the players that SUMO drives; None if it drives none."""
@@ -281,8 +249,3 @@ class LibsumoSimulation(Simulation):
         players[..., 0] -= self._half_length * np.cos(players[..., 2])
         players[..., 1] -= self._half_length * np.sin(players[..., 2]) + self._tiles.offsets_m[:, None]
         return players
-
-
-def _release(folder: tempfile.TemporaryDirectory[str]) -> None:
-    libsumo.close()
-    folder.cleanup()

@@ -136,8 +136,9 @@ class SpeedLimits:
         tiles = {prefix: tile for tile, prefix in enumerate(prefixes)}
         for lane in libsumo.lane.getIDList():
             inner = lane.removeprefix(":")
-            prefix = inner[: inner.find("_") + 1] if len(prefixes) > 1 else ""
-            self._lanes[tiles[prefix]].append((lane, libsumo.lane.getMaxSpeed(lane)))
+            prefix = inner[: inner.find("_") + 1] if "" not in tiles else ""
+            if prefix in tiles:
+                self._lanes[tiles[prefix]].append((lane, libsumo.lane.getMaxSpeed(lane)))
 
     def reset(self, game: int, share: float) -> None:
         """Multiply the net's limits in a game's tile by a factor."""

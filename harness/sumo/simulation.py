@@ -128,6 +128,20 @@ def distance_to_player_m(fronts_m: FloatArray, of_game: IntArray, players: Playe
     return np.where(present, distances_m, np.inf).min(1)
 
 
+class TypeNames(NamedTuple):
+    """The names that the vehicle types of a scene have in SUMO."""
+
+    prefix: str = ""
+    own: frozenset[str] = frozenset()
+    """The ids of the scene's types. Others are SUMO's own, such as `DEFAULT_VEHTYPE`."""
+
+    def in_sumo(self, vehicle_type: str) -> str:
+        return self.prefix + vehicle_type if vehicle_type in self.own else vehicle_type
+
+    def plain(self, in_sumo: str) -> str:
+        return in_sumo.removeprefix(self.prefix)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Tiles:
     """The tiles of the games: copies of the net, side by side."""
@@ -136,8 +150,13 @@ class Tiles:
     """Of all names in the tile of each game."""
     offsets_m: FloatArray
     """[G] in y"""
-    roads_m: FloatArray | None = None
+    roads_m: FloatArray | None
     """[n, 3] points of the players' roads; None if all roads are on one level."""
+    types: TypeNames
+
+    def has(self, name: str) -> bool:
+        """Whether a name in SUMO is one of these tiles."""
+        return name.startswith(tuple(self.prefixes))
 
     def points_m(self, points: Iterable[tuple[float, ...]], of_game: IntArray, size: int = 2) -> FloatArray:
         """[n, size] the points of SUMO in games [n], in the coordinates of the net."""
@@ -171,8 +190,11 @@ class Simulation(Protocol):
     def remove(self, game: int, player: int) -> None:
         """Remove a player from the traffic."""
 
-    def step(self, x_m: FloatArray, y_m: FloatArray, heading_rad: FloatArray) -> Reading:
-        """Place the players that the harness drives at poses [G, P] of their centres, step SUMO, read its vehicles."""
+    def place(self, x_m: FloatArray, y_m: FloatArray, heading_rad: FloatArray) -> None:
+        """Place the players that the harness drives at poses [G, P] of their centres."""
+
+    def step(self) -> Reading:
+        """Step SUMO, and read its vehicles. Every step needs a `place` before it."""
         ...
 
     def turn_signals(self, vehicles: Sequence[tuple[int, str]]) -> list[str]:

@@ -20,25 +20,34 @@ from pathlib import Path
 from typing import IO, Any
 
 from harness.errors import SimulationError
-from harness.road.scene.open_scene import OpenScene
-from harness.sumo.simulation import Simulation
+from harness.game.arrays import FloatArray
+from harness.sumo.scene_games import SceneGames, can_share
+from harness.sumo.simulation import Reading, Simulation
 
 
-def open_simulation(
-    scene: OpenScene, games: int, taken_over: Sequence[bool], *, seed: int, recorded: bool = False
-) -> Simulation:
-    """Load SUMO with a tile for each game: in this process if its libsumo is free, otherwise in a child process.
+def open_simulations(parts: Sequence[SceneGames], *, seed: int) -> list[Simulation]:
+    """Load SUMO with a tile for each game of several simulations.
 
-    `taken_over` [P] marks the players that the harness drives. With `recorded`, every background vehicle is read in
-    every step, near a player or not; reading a vehicle costs as much time as SUMO's own work on it.
-
-    Both kinds of simulation give the same numbers. A child process needs one message each way per call. Raises
-    SimulationError if SUMO can't load the scene.
+    The first simulation, and all that can share its SUMO (`can_share`), are in this process if its libsumo is free;
+    each other one is in a child process of its own. Where simulations share SUMO, all of them place their players
+    before one of them is stepped. A child process gives the same numbers as this one, and needs one message each way
+    per call. Raises SimulationError if SUMO can't load a scene.
     """
     from harness.sumo.libsumo_simulation import LibsumoSimulation
 
-    kind = SubprocessSimulation if LibsumoSimulation.in_use() else LibsumoSimulation
-    return kind(scene, games, taken_over, seed, recorded=recorded)
+    here = [] if LibsumoSimulation.in_use() else [k for k, part in enumerate(parts) if can_share(parts[0], part)]
+    opened: dict[int, Simulation] = {}
+    try:
+        if here:
+            opened.update(zip(here, LibsumoSimulation.side_by_side([parts[k] for k in here], seed), strict=True))
+        for k, part in enumerate(parts):
+            if k not in opened:
+                opened[k] = SubprocessSimulation(part, seed)
+    except BaseException:
+        for each in opened.values():
+            each.close()
+        raise
+    return [opened[k] for k in range(len(parts))]
 
 
 _PATIENCE_S = 10.0  # time limit for a child to end
@@ -52,9 +61,7 @@ def _in_the_child(method: str) -> Any:
 class SubprocessSimulation(Simulation):
     """A `LibsumoSimulation` in a child process. The child ends with `close`, or with this object."""
 
-    def __init__(
-        self, scene: OpenScene, games: int, taken_over: Sequence[bool], seed: int, *, recorded: bool = False
-    ) -> None:
+    def __init__(self, games: SceneGames, seed: int) -> None:
         """Spawn the child and load SUMO in it. Raises SimulationError if either fails."""
         try:
             self._child = _spawn_child()
@@ -62,13 +69,21 @@ class SubprocessSimulation(Simulation):
             raise SimulationError(f"the process of another simulation could not be started: {error}") from error
         self._finalizer = weakref.finalize(self, _end_child, self._child)
         try:
-            self._call(replace(scene, folder=scene.folder.resolve()), games, tuple(taken_over), seed, recorded)
+            scene = replace(games.scene, folder=games.scene.folder.resolve())
+            self._call(replace(games, scene=scene), seed)
         except BaseException:
             self.close()
             raise
 
     reload, reset, halt, remove = map(_in_the_child, ("reload", "reset", "halt", "remove"))
-    step, turn_signals = map(_in_the_child, ("step", "turn_signals"))
+    turn_signals = _in_the_child("turn_signals")
+
+    def place(self, x_m: FloatArray, y_m: FloatArray, heading_rad: FloatArray) -> None:
+        self._poses = x_m, y_m, heading_rad  # sent with the next step: a message takes longer than placing
+
+    def step(self) -> Reading:
+        reading: Reading = self._call("step", *self._poses)
+        return reading
 
     def close(self) -> None:
         self._finalizer()
@@ -155,8 +170,10 @@ def serve() -> None:
             result, refusal = None, None
             try:
                 if simulation is None:
-                    *of_game, recorded = arguments
-                    simulation = LibsumoSimulation(first, *of_game, recorded=recorded)
+                    [simulation] = LibsumoSimulation.side_by_side([first], *arguments)
+                elif first == "step":
+                    simulation.place(*arguments)
+                    result = simulation.step()
                 else:
                     result = getattr(simulation, first)(*arguments)
             except SimulationError as error:

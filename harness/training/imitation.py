@@ -16,7 +16,7 @@ from stable_baselines3 import PPO
 from harness.drivers.car import car_of
 from harness.drivers.ordinary_walker import OrdinaryWalker
 from harness.drivers.rules_driver import LANE_KEEPER, RulesDriver
-from harness.environments.vector_env import ArenaVecEnv, JoinedVecEnv
+from harness.environments.vector_env import JoinedVecEnv
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.world import World
 
@@ -32,31 +32,35 @@ def imitate(model: PPO, environment: JoinedVecEnv, *, steps: int, deviation: flo
     rounds = steps // environment.num_envs
     if not rounds:
         return
-    noise, places = np.random.default_rng(seed), environment.environments
-    shown = [_demonstrate(place, rounds, discount=model.gamma, deviation=deviation, noise=noise) for place in places]
-    observations, actions, returns = (np.concatenate(each) for each in zip(*shown, strict=True))
+    noise = np.random.default_rng(seed)
+    observations, actions, returns = _demonstrate(
+        environment, rounds, discount=model.gamma, deviation=deviation, noise=noise
+    )
     _fit(model, observations, actions, returns, order=torch.Generator().manual_seed(seed))
 
 
 def _demonstrate(
-    environment: ArenaVecEnv, rounds: int, *, discount: float, deviation: float, noise: np.random.Generator
+    environment: JoinedVecEnv, rounds: int, *, discount: float, deviation: float, noise: np.random.Generator
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """What the demonstrator saw [N, SIZE] and did [N, 2], without the noise, in so many steps of every game, and its
+    """What the demonstrators saw [N, SIZE] and did [N, 2], without the noise, in so many steps of every game, and their
     returns [N]; NaN in games that had not ended."""
-    driver = _demonstrator(environment.arena.world, environment.learner)
-    games = np.arange(environment.num_envs)
-    driver.reset(games)
+    drivers = [_demonstrator(each.arena.world, each.learner) for each in environment.environments]
+    games = [np.arange(each.num_envs) for each in environment.environments]
+    for driver, own in zip(drivers, games, strict=True):
+        driver.reset(own)
     observation = environment.reset()
     observations, actions, payoffs, ended = [], [], [], []
     for _ in range(rounds):
-        wanted = driver.decide(games, observation, np.zeros((len(games), 2)))
+        of_drivers = zip(drivers, games, environment.split(observation), strict=True)
+        wanted = np.concatenate([driver.decide(own, seen, np.zeros((len(own), 2))) for driver, own, seen in of_drivers])
         observations.append(observation)
         actions.append(wanted)
         environment.step_async(np.clip(wanted + noise.normal(0.0, deviation, wanted.shape), -1.0, 1.0))
         observation, payoff, done, _ = environment.step_wait()
         payoffs.append(payoff)
         ended.append(done)
-        driver.reset(np.flatnonzero(done))
+        for driver, own in zip(drivers, environment.split(done), strict=True):
+            driver.reset(np.flatnonzero(own))
     environment.take_finished()  # they are not games of the training
     returns = returns_of(np.array(payoffs), np.array(ended), discount)
     return np.concatenate(observations), np.concatenate(actions), returns.ravel()

@@ -9,9 +9,9 @@ from harness.config.training import Training
 from harness.drivers.mixture import Mixture, factors_of, shares_of
 from harness.drivers.policy_file import Policy
 from harness.drivers.protocol import Driver
-from harness.environments.arena import Arena, Seat
 from harness.environments.auto_reset import Replays
-from harness.environments.seats import seats_of
+from harness.environments.joined_arenas import SeatedGames, open_arenas
+from harness.environments.seats import Seat, seats_of
 from harness.environments.vector_env import ArenaVecEnv, JoinedVecEnv
 from harness.game.initial_state import StartDistribution
 from harness.game.seeding import seed_of
@@ -70,22 +70,21 @@ class TrainingSpec:
 
 
 def open_games(spec: TrainingSpec) -> JoinedVecEnv:
-    """The games of a training; each of its places has an arena of its own. Raises SimulationError if SUMO fails."""
+    """The games of a training; each of its places has an arena of its own, and they share SUMO where they can. Raises
+    SimulationError if SUMO fails."""
     games, places = spec.settings.games, len(spec.places)
-    environments: list[ArenaVecEnv] = []
-    try:
-        for number, place in enumerate(spec.places):
-            seats = [seats_of(each, paid=False) for each in place.drivers]
-            seats[place.player] = (Seat(None, spec.persona.payoff),)
-            own_games = games // places + (number < games % places)
-            arena = Arena(place.scene, own_games, seats, seed=seed_of(*spec.parts, "sumo") % 2**31)
-            starts, parts = _start_distribution(spec, place, 0), _parts_of(number, *spec.parts)
-            scale = spec.settings.payoff_scale
-            environments.append(ArenaVecEnv(arena, place.player, starts, *parts, payoff_scale=scale))
-    except BaseException:
-        for each in environments:
-            each.close()
-        raise
+    parts = []
+    for number, place in enumerate(spec.places):
+        seats = [seats_of(each, paid=False) for each in place.drivers]
+        seats[place.player] = (Seat(None, spec.persona.payoff),)
+        own_games = games // places + (number < games % places)
+        parts.append(SeatedGames(scene=place.scene, games=own_games, seats=seats))
+    environments = []
+    for number, arena in enumerate(open_arenas(parts, seed=seed_of(*spec.parts, "sumo") % 2**31)):
+        place = spec.places[number]
+        starts, of_place = _start_distribution(spec, place, 0), _parts_of(number, *spec.parts)
+        scale = spec.settings.payoff_scale
+        environments.append(ArenaVecEnv(arena, place.player, starts, *of_place, payoff_scale=scale))
     return JoinedVecEnv(environments)
 
 

@@ -45,9 +45,9 @@ def test_vary__writes_a_scene_that_is_in_order_and_says_how_its_road_differs(
         vary(PAPER_MERGE, "--roads", 2, "--seed", 4, "--out", tmp_path)
 
 
-def test_vary__into_a_folder_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="--out"):
-        vary(PAPER_MERGE, "--out", tmp_path / "nowhere")
+def test_vary__makes_the_folder(tmp_path: Path) -> None:
+    vary(PAPER_MERGE, "--roads", 1, "--out", tmp_path / "new" / "roads")
+    assert (tmp_path / "new" / "roads" / "paper_merge_road1" / "scene.toml").is_file()
 
 
 def test_vary__a_scene_with_a_compressed_file_is_refused_before_a_road_is_drawn(tmp_path: Path) -> None:

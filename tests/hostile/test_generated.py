@@ -18,7 +18,7 @@ from harness.config.scene import Scene
 from harness.config.toml_reading import Document, read_document, tomllib
 from harness.drivers.policy_file import read_policy, write_policy
 from harness.errors import UsageError
-from harness.road.net.tiles import tile_offset_m
+from harness.road.net.tiles import Copies, tiles_of
 from harness.road.scene.open_scene import open_scene
 from tests.hostile.inputs import CAMPAIGN_TEXT, NET, PERSONA_TEXT, ROUTES, SCENE, write_project
 from tests.support.policies import some_policy
@@ -106,7 +106,7 @@ def test_scene__with_odd_bytes_somewhere(name: str, folder: Path, data: st.DataO
     scene = (folder / name).parent
     (folder / name).write_bytes(_damaged(sound, data))
     try:
-        in_order_or_refused(lambda: tile_offset_m(open_scene(scene).net_file, 2), "networks/road")
+        in_order_or_refused(lambda: tiles_of([Copies(open_scene(scene).net_file, 2)]), "networks/road")
     finally:
         (folder / name).write_bytes(sound)
 

@@ -61,8 +61,9 @@ def test_gzip__a_net_is_checked_read_tiled_and_replayed(
     check_net(net)
     assert [edge.getID() for edge in read_net(net).getEdges(withInternal=False)] == ["approach", "exit"]
     assert Lanes.read(net).ids == Lanes.read(merge.net_file).ids
-    assert tiles.tile_offset_m(net, 2) == tiles.tile_offset_m(merge.net_file, 2)
-    assert readNet(str(tiles.tiled_net(net, 2))).hasEdge("g1_approach")
+    [of_net], [of_merge] = (tiles.tiles_of([tiles.Copies(each, 2)]) for each in (net, merge.net_file))
+    assert [tile.offset_m for tile in of_net] == [tile.offset_m for tile in of_merge]
+    assert readNet(str(tiles.tiled_net(of_net))).hasEdge("g1_approach")
 
 
 def test_schema__addresses_that_were_sumos_are_accepted(tmp_path: Path) -> None:

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from harness.errors import SimulationError
 from harness.game.state import NOTICED_M
 from harness.road.demand.route_file import Departure
-from harness.sumo.libsumo_simulation import LibsumoSimulation
 from harness.sumo.simulation import distance_to_player_m, reading_of
 from tests.support.scenes import LEFT_Y, build_scene, placed
+from tests.support.simulations import local_simulation, stepped
 
 GAMES, STEPS, VAN_M = 3, 40, 6.0
 LONG = "a_name_that_is_longer_than_the_room_within_a_string_of_the_library"
@@ -32,14 +32,14 @@ def van(name: str, position_m: float, depart_s: float = 0.0) -> Departure:
 def test_reading__is_what_sumo_has(tmp_path: Path, recorded: bool) -> None:
     """Of all vehicles in a recorded game, else of those near a player; the table of vehicles grows."""
     scene = build_scene(tmp_path, others=OTHERS)
-    with closing(LibsumoSimulation(scene, GAMES, (True, True), 5, recorded=recorded)) as simulation:
+    with closing(local_simulation(scene, GAMES, seed=5, recorded=recorded)) as simulation:
         for game in range(GAMES):
             row = [van(f"v{k}", 20.0 + 20.0 * k) for k in range(7 + 3 * game)]
             late = [van(LONG, 10.0, depart_s=1.5), van("leaves", 290.0)]
             simulation.reset(game, placed(scene, (40, LEFT_Y, 0, 10), None), row + late)
         for _ in range(STEPS):
             x, y = np.full((GAMES, 2), 40.0), np.full((GAMES, 2), LEFT_Y)
-            reading = simulation.step(x, y, np.zeros((GAMES, 2)))
+            reading = stepped(simulation, x, y, np.zeros((GAMES, 2)))
             found = {}
             for game, place in np.argwhere(reading.present).tolist():
                 assert reading.types[game, place] == "van"
@@ -56,13 +56,13 @@ def test_reading__is_what_sumo_has(tmp_path: Path, recorded: bool) -> None:
 
 def test_reading__a_vehicle_that_sumo_has_lost_is_an_error(tmp_path: Path) -> None:
     scene = build_scene(tmp_path, others=OTHERS)
-    with closing(LibsumoSimulation(scene, 1, (True, True), 1)) as simulation:
+    with closing(local_simulation(scene)) as simulation:
         start = placed(scene, (40, LEFT_Y, 0, 0), None)
         simulation.reset(0, start, [van("first", 60), van("second", 120)])
-        simulation.step(start.x_m[None], start.y_m[None], start.heading_rad[None])
+        stepped(simulation, start.x_m[None], start.y_m[None], start.heading_rad[None])
         libsumo.vehicle.remove("second")
         with pytest.raises(SimulationError, match="'second' is not known"):
-            simulation.step(start.x_m[None], start.y_m[None], start.heading_rad[None])
+            stepped(simulation, start.x_m[None], start.y_m[None], start.heading_rad[None])
 
 
 def test_distance__is_that_to_the_nearest_player_that_is_present() -> None:

@@ -24,6 +24,7 @@ from harness.sumo.libsumo_simulation import LibsumoSimulation
 from harness.sumo.simulation import Reading
 from tests.support.repository import REPOSITORY
 from tests.support.scenes import LEFT_Y, RIGHT_Y, build_scene, placed
+from tests.support.simulations import local_simulation, stepped
 
 HARNESS, SUMO = True, False
 BACKGROUND = '<vehicle id="other" type="van" depart="0"><route edges="road"/></vehicle>'
@@ -49,7 +50,7 @@ def opened(scene: OpenScene) -> Iterator[Open]:
     def opened(
         taken_over: tuple[bool, bool] = (HARNESS, HARNESS), games: int = 1, on: OpenScene = scene, seed: int = 1
     ):
-        simulations.append(LibsumoSimulation(on, games, taken_over, seed))
+        simulations.append(local_simulation(on, games, taken_over, seed))
         return simulations[-1]
 
     yield opened
@@ -77,7 +78,7 @@ def other(name: str, depart_s: float = 0.0, lane: str = "0", position: str = "10
 
 def step(simulation: LibsumoSimulation, start: InitialState) -> Reading:
     """A step in which the players stay at their start."""
-    return simulation.step(start.x_m[None], start.y_m[None], start.heading_rad[None])
+    return stepped(simulation, start.x_m[None], start.y_m[None], start.heading_rad[None])
 
 
 def centre_in_sumo(name: str) -> tuple[float, float, float]:
@@ -99,7 +100,7 @@ def test_step__sumo_has_the_poses_of_the_players_in_every_game(scene: OpenScene,
             x, y = generator.uniform(10 - reach_m, 290 + reach_m, (2, 2)), generator.uniform(-9, 3, (2, 2))
             heading = generator.uniform(-np.pi, np.pi, (2, 2))
             for _ in range(5):
-                simulation.step(x, y, heading)
+                stepped(simulation, x, y, heading)
             for k, name in enumerate(("g0_ego", "g0_non_ego")):
                 assert centre_in_sumo(name) == pytest.approx((x[0, k], y[0, k], heading[0, k]), abs=1e-3)
         assert set(libsumo.vehicle.getIDList()) == {"g0_ego", "g0_non_ego", "g1_ego", "g1_non_ego"}
@@ -111,7 +112,7 @@ def test_step__tiles_are_side_by_side_and_independent(busy: OpenScene, opened: O
     for game in range(3):
         simulation.reset(game, placed(busy, (40, RIGHT_Y, 0, 10), None), [other("van")])
     poses = np.array([[50.0, 0.0], [60.0, 0.0], [70.0, 0.0]]), np.full((3, 2), RIGHT_Y), np.zeros((3, 2))
-    reading = simulation.step(*poses)
+    reading = stepped(simulation, *poses)
     assert [round(libsumo.vehicle.getPosition(f"g{k}_ego")[0] - 2.3) for k in range(3)] == [50, 60, 70]
     assert len({libsumo.vehicle.getPosition(f"g{k}_ego")[1] for k in range(3)}) == 3
     assert reading.names.tolist() == [["van"]] * 3
@@ -123,7 +124,7 @@ def test_step__sumo_has_the_speed_of_a_player_above_the_limit(busy: OpenScene, o
     simulation.reset(0, placed(busy, (40, RIGHT_Y, 0, 12), None), [])
     speeds = []
     for k in range(1, 4):
-        simulation.step(np.array([[40 + 2.5 * k, 0]]), np.array([[RIGHT_Y, 0]]), np.zeros((1, 2)))
+        stepped(simulation, np.array([[40 + 2.5 * k, 0]]), np.array([[RIGHT_Y, 0]]), np.zeros((1, 2)))
         speeds.append(libsumo.vehicle.getSpeed("ego"))
     assert speeds == pytest.approx([12, 25, 25])  # the first step has the start speed
 
@@ -254,7 +255,7 @@ def test_close__twice_has_no_effect_on_the_next_simulation(scene: OpenScene, ope
 
 
 def test_garbage__releases_libsumo(scene: OpenScene) -> None:
-    simulation = weakref.ref(LibsumoSimulation(scene, 1, (True, True), 1))
+    simulation = weakref.ref(local_simulation(scene))
     gc.collect()
     assert simulation() is None
     assert not LibsumoSimulation.in_use()
@@ -263,16 +264,16 @@ def test_garbage__releases_libsumo(scene: OpenScene) -> None:
 def test_failed_load__is_an_error_and_leaves_libsumo_free(scene: OpenScene) -> None:
     broken = replace(scene, routes=replace(scene.routes, types_xml="<routes><vType/></routes>"))
     with pytest.raises(SimulationError, match="load scene 'small'"):
-        LibsumoSimulation(broken, 1, (True, True), 1)
+        local_simulation(broken)
     assert not LibsumoSimulation.in_use()
 
 
 def test_exit__without_close_is_quiet_and_leaves_no_file(scene: OpenScene, tmp_path: Path) -> None:
     program = f"""
 import pathlib
-from harness.sumo.libsumo_simulation import LibsumoSimulation
 from harness.road.scene.open_scene import open_scene
-simulation = LibsumoSimulation(open_scene(pathlib.Path({str(scene.folder)!r})), 1, (True, True), 1)
+from tests.support.simulations import local_simulation
+simulation = local_simulation(open_scene(pathlib.Path({str(scene.folder)!r})))
 """
     run = subprocess.run(
         [sys.executable, "-X", "dev", "-c", program],

@@ -22,6 +22,7 @@ from harness.game.roles import EGO, NON_EGO
 from harness.road.scene.open_scene import OpenScene
 from harness.sumo.libsumo_simulation import LibsumoSimulation
 from tests.support.scenes import CROSSING, CROSSING_EDGES, CROSSING_NODES, build_scene, drawn
+from tests.support.simulations import local_simulation, stepped
 
 CYCLE_S, STEP_S = 90.0, 0.1
 LIGHTS = CROSSING_NODES.replace('id="c" x="0" y="0" type="priority"', 'id="c" x="0" y="0" type="traffic_light"')
@@ -40,7 +41,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
 def opened(scene: OpenScene) -> Iterator[Open]:
     """Opens simulations, and closes them."""
     with ExitStack() as stack:
-        yield lambda games=1: stack.enter_context(closing(LibsumoSimulation(scene, games, (True, True), 1)))
+        yield lambda games=1: stack.enter_context(closing(local_simulation(scene, games)))
 
 
 def starting(scene: OpenScene, place: float) -> InitialState:
@@ -61,7 +62,7 @@ def column(scene: OpenScene, player: int) -> int:
 def read(simulation: LibsumoSimulation, start: InitialState, steps: int) -> IntArray:
     """[T, L] the states of a single game's links in each step; the cars stand."""
     poses = [np.array([column]) for column in (start.x_m, start.y_m, start.heading_rad)]
-    states = [simulation.step(*poses).signals for _ in range(steps)]
+    states = [stepped(simulation, *poses).signals for _ in range(steps)]
     return np.array([each[0] for each in states if each is not None])
 
 
@@ -117,7 +118,7 @@ def test_reset__a_game_does_not_move_the_lights_of_the_others(scene: OpenScene, 
     simulation.reset(1, starting(scene, seconds(20.0)[0]), [])
     start = starting(scene, 0.0)
     poses = [np.tile(column, (3, 1)) for column in (start.x_m, start.y_m, start.heading_rad)]
-    states = simulation.step(*poses).signals
+    states = stepped(simulation, *poses).signals
     assert states is not None
     assert states[0].tolist() == before[0].states.tolist()
     assert states[2].tolist() == before[2].states.tolist()

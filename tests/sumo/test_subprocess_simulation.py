@@ -24,10 +24,11 @@ from harness.road.demand.route_file import Departure
 from harness.road.scene.open_scene import OpenScene
 from harness.sumo import subprocess_simulation
 from harness.sumo.libsumo_simulation import LibsumoSimulation
-from harness.sumo.subprocess_simulation import SubprocessSimulation, open_simulation
+from harness.sumo.subprocess_simulation import SubprocessSimulation, open_simulations
 from tests.support.processes import is_running
 from tests.support.repository import REPOSITORY
 from tests.support.scenes import LEFT_Y, ZIPPER, ZIPPER_EDGES, ZIPPER_NODES, build_scene, drawn, placed
+from tests.support.simulations import games_of, stepped
 from tests.support.tiny import wait_for
 
 FLOW = '<flow id="f" type="van" begin="0" period="3" departLane="random"><route edges="road"/></flow>'
@@ -40,15 +41,15 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
 
 @pytest.fixture
 def far(scene: OpenScene) -> Iterator[SubprocessSimulation]:
-    with closing(SubprocessSimulation(scene, 1, (True, True), 1)) as simulation:
+    with closing(SubprocessSimulation(games_of(scene), 1)) as simulation:
         yield simulation
 
 
 def test_open__one_simulation_at_a_time_is_local(scene: OpenScene) -> None:
-    first = open_simulation(scene, 1, (True, True), seed=1)
-    second = open_simulation(scene, 1, (True, True), seed=1)
+    [first] = open_simulations([games_of(scene)], seed=1)
+    [second] = open_simulations([games_of(scene)], seed=1)
     first.close()
-    third = open_simulation(scene, 1, (True, True), seed=1)
+    [third] = open_simulations([games_of(scene)], seed=1)
     kinds = [type(each) for each in (first, second, third)]
     for each in (second, third):
         each.close()
@@ -89,14 +90,14 @@ def test_refusal__in_the_child_is_an_error_and_the_child_continues(scene: OpenSc
         far.reset(0, start, [refused])
     far.reload(1)
     far.reset(0, start, [])
-    assert far.step(start.x_m[None], start.y_m[None], start.heading_rad[None]).names.tolist() == [[]]
+    assert stepped(far, start.x_m[None], start.y_m[None], start.heading_rad[None]).names.tolist() == [[]]
 
 
 def test_refusal__to_load_leaves_no_child(scene: OpenScene, tmp_path: Path) -> None:
     broken = build_scene(tmp_path)
     broken.net_file.write_text("<net")
     with pytest.raises(SimulationError, match=r"n\.net\.xml"):
-        SubprocessSimulation(broken, 1, (True, True), 1)
+        SubprocessSimulation(games_of(broken), 1)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals")
@@ -129,7 +130,7 @@ def test_close__ends_the_child_and_may_be_repeated(far: SubprocessSimulation) ->
 
 
 def test_garbage__ends_the_child(scene: OpenScene) -> None:
-    child = SubprocessSimulation(scene, 1, (True, True), 1)._child
+    child = SubprocessSimulation(games_of(scene), 1)._child
     gc.collect()
     assert child.poll() == 0
 
@@ -144,7 +145,10 @@ class Printing:
     def __init__(self, *arguments, **options): os.write(1, b"SUMO says"); print("this", flush=True)
     def reload(self, seed): os.write(1, b"and that"); return seed
     def close(self): print("bye", flush=True)
-libsumo_simulation.LibsumoSimulation = Printing
+class Kind:
+    @staticmethod
+    def side_by_side(parts, seed): return [Printing()]
+libsumo_simulation.LibsumoSimulation = Kind
 subprocess_simulation.serve()
 """
     child = subprocess.Popen(
@@ -156,7 +160,7 @@ subprocess_simulation.serve()
     )
     assert child.stdin is not None
     assert child.stdout is not None
-    for message, answer in (((None, 1, (True, True), 1, False), None), (("reload", 5), 5)):
+    for message, answer in (((None, 1), None), (("reload", 5), 5)):
         child.stdin.write(pickle.dumps(message))
         child.stdin.flush()
         assert pickle.load(child.stdout) == (answer, None)
@@ -168,9 +172,10 @@ SCRIPT = """
 import os, pathlib, signal, sys
 sys.path.insert(0, {repository!r})
 from harness import open_scene
-from harness.sumo.subprocess_simulation import open_simulation
-scene = open_scene(pathlib.Path("straight"))
-both = [open_simulation(scene, 1, (True, True), seed=1) for _ in range(2)]
+from harness.sumo.scene_games import SceneGames
+from harness.sumo.subprocess_simulation import open_simulations
+games = SceneGames(scene=open_scene(pathlib.Path("straight")), games=1, taken_over=(True, True))
+both = [each for _ in range(2) for each in open_simulations([games], seed=1)]
 os.chdir("/")
 both[1].reload(2)
 print(both[1]._child.pid, flush=True)
@@ -195,7 +200,7 @@ def test_soak__players_off_the_road_near_a_zipper_junction_do_not_crash_sumo(tmp
     """SUMO 1.28 crashes (SIGSEGV within a thousand steps) if lane changes take time, and with its sublane model."""
     scene = build_scene(tmp_path, ZIPPER_NODES, ZIPPER_EDGES, ZIPPER, goal_m=100.0)
     generator = np.random.default_rng(0)
-    with closing(SubprocessSimulation(scene, 4, (True, True), 1)) as simulation:
+    with closing(SubprocessSimulation(games_of(scene, 4), 1)) as simulation:
         for episode in range(14):
             x, y = generator.uniform(90, 150, (4, 2)), generator.uniform(-9, 0, (4, 2))
             heading, turning = np.zeros((4, 2)), generator.normal(0.0, 0.03, (4, 2))
@@ -204,4 +209,4 @@ def test_soak__players_off_the_road_near_a_zipper_junction_do_not_crash_sumo(tmp
             for _ in range(250):
                 heading = heading + turning + generator.normal(0.0, 0.05, (4, 2))
                 x, y = x + 0.6 * np.cos(heading), y + 0.6 * np.sin(heading)
-                simulation.step(x, y, heading)
+                stepped(simulation, x, y, heading)

@@ -252,9 +252,9 @@ def test_train__ppo_sees_scaled_payoffs_and_the_curve_does_not(
     alone: TrainingSpec, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rewards: list[np.ndarray] = []
-    step = ArenaVecEnv.step_wait
+    step = JoinedVecEnv.step_wait
 
-    def recording(environment: ArenaVecEnv) -> Any:
+    def recording(environment: JoinedVecEnv) -> Any:
         result = step(environment)
         rewards.append(result[1])
         return result
@@ -265,7 +265,7 @@ def test_train__ppo_sees_scaled_payoffs_and_the_curve_does_not(
         spec = replace(alone, settings=settings(steps=1024, buffer=1024, payoff_scale=scale))
         return in_one_go(spec, tmp_path / f"{scale}").progress.curve[0].mean_payoff
 
-    monkeypatch.setattr(ArenaVecEnv, "step_wait", recording)
+    monkeypatch.setattr(JoinedVecEnv, "step_wait", recording)
     assert curve(0.25) == pytest.approx(curve(1.0))
     scaled, plain = np.split(np.concatenate(rewards), 2)
     np.testing.assert_allclose(scaled, 0.25 * plain, rtol=1e-6)

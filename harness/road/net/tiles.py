@@ -1,14 +1,18 @@
-"""Tiled nets: G copies of a scene's net side by side in one net, so that one SUMO plays G games.
+"""Tiled nets: copies of the nets of scenes side by side in one net, a tile for each game, so that one SUMO plays all.
 
-The tiled net is cached by the net's content, the number of games, the junctions that are kept, and the format.
+A tiled net is cached by the content of the nets, their tiles, and the format.
 """
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from decimal import Decimal
+from hashlib import sha256
+from math import ceil
 from pathlib import Path
+from typing import NamedTuple
 from xml.etree import ElementTree
 from xml.sax.saxutils import quoteattr
 
@@ -29,28 +33,73 @@ _NAMES = {
 _SHAPES = ("shape", "outlineShape")
 
 
-def write_tiles(
-    net_file: Path, file: Path, *, prefixes: Collection[str], offset_m: float, junctions: Collection[str] | None
-) -> None:
-    """Write a net with a copy of a net for each prefix, each `offset_m` north of the one before.
+@dataclass(frozen=True, kw_only=True)
+class Tile:
+    """A copy of a net."""
 
-    With `junctions`, only these junctions of the net and their edges are copied.
-    """
-    root = parse_xml(net_file, None if junctions is None else _at(set(junctions)))
-    elements = list(root) if junctions is None else list(_cut(root, set(junctions)))
+    net_file: Path
+    prefix: str = ""
+    """Of all names in the copy."""
+    offset_m: float = 0.0
+    """To the north."""
+    junctions: frozenset[str] | None = None
+    """Only these junctions of the net and their edges are copied; None: all of it."""
+
+    @property
+    def part(self) -> tuple[Path, frozenset[str] | None]:
+        """What is copied."""
+        return self.net_file, self.junctions
+
+
+def write_tiles(tiles: Sequence[Tile], file: Path) -> None:
+    """Write a net with all tiles; its attributes, types and projection are those of the first net."""
+    read: dict[tuple[Path, frozenset[str] | None], _Net] = {}
+    for tile in tiles:
+        if tile.part not in read:
+            read[tile.part] = _Net.read(*tile.part)
+    copies = [(tile, read[tile.part]) for tile in tiles]
+    root = copies[0][1].root
     with file.open("w", encoding="utf-8") as out:
         attributes = {name: value for name, value in root.attrib.items() if not name.startswith("{")}
         out.write(f"<net{_written(attributes)}>\n")
         for location in root.findall("location"):
-            *numbers, north = location.get("convBoundary", "0,0,0,0").split(",")
-            north_m = Decimal(north) + Decimal(str(offset_m)) * (len(prefixes) - 1)
-            location.set("convBoundary", ",".join((*numbers, str(north_m))))
+            location = ElementTree.Element("location", {**location.attrib, "convBoundary": _boundary(copies)})
             out.writelines(_copy(location, _change("", Decimal(0))))
         for tag in _ORDER:
-            for k, prefix in enumerate(prefixes if tag != "type" else ("",)):
-                change = _change(prefix, Decimal(str(offset_m)) * k)
-                out.writelines(_copy(each, change) for each in elements if each.tag == tag)
+            for tile, net in copies if tag != "type" else copies[:1]:
+                prefix = tile.prefix if tag != "type" else ""
+                change = _change(prefix, _decimal(tile.offset_m))
+                out.writelines(_copy(each, change) for each in net.elements if each.tag == tag)
         out.write("</net>\n")
+
+
+class _Net(NamedTuple):
+    """A net, or the part of it at some junctions."""
+
+    root: ElementTree.Element
+    elements: list[ElementTree.Element]
+
+    @classmethod
+    def read(cls, net_file: Path, junctions: frozenset[str] | None) -> _Net:
+        root = parse_xml(net_file, None if junctions is None else _at(set(junctions)))
+        return cls(root, list(root) if junctions is None else list(_cut(root, set(junctions))))
+
+
+def _boundary(copies: Iterable[tuple[Tile, _Net]]) -> str:
+    """The smallest box around all tiles, as text."""
+    corners = []
+    for tile, net in copies:
+        location = net.root.find("location")
+        text = "0,0,0,0" if location is None else location.get("convBoundary", "0,0,0,0")
+        west, south, east, north = map(Decimal, text.split(","))
+        offset = _decimal(tile.offset_m)
+        corners.append((west, south + offset, east, north + offset))
+    ends = zip((min, min, max, max), zip(*corners, strict=True), strict=True)
+    return ",".join(str(end(values)) for end, values in ends)
+
+
+def _decimal(metres: float) -> Decimal:
+    return Decimal(str(metres))
 
 
 def _change(prefix: str, shift_m: Decimal) -> Callable[[str, str, str], str]:
@@ -137,36 +186,65 @@ def _dead_end(junction: ElementTree.Element, edges: Collection[str]) -> ElementT
 
 
 _GAP_M = 200.0
-_FORMAT = 2  # raised when the same net gives another file
+_FORMAT = 2  # raised when the same tiles give another file
 _LOGGER = logging.getLogger("harness.preparation")
 
 
-def tile_prefix(game: int, games: int) -> str:
-    """The prefix of every name in a game's tile; empty if there is one game."""
-    return f"g{game}_" if games > 1 else ""
+class Copies(NamedTuple):
+    """How many copies of a net, or of the part of it at some junctions, are wanted."""
+
+    net_file: Path
+    games: int
+    junctions: frozenset[str] | None = None
 
 
-def tile_offset_m(net_file: Path, games: int) -> float:
-    """Distance from each tile to the next one, in y; 0 for one game."""
-    location = parse_xml(net_file).find("location")
-    if games == 1 or location is None:
-        return 0.0
-    _, low, _, high = (float(each) for each in location.get("convBoundary", "0,0,0,0").split(","))
-    return float(round(high - low + _GAP_M))
+def tiles_of(nets: Sequence[Copies]) -> list[list[Tile]]:
+    """The tiles of each net, from south to north with room between them. A single one is the net as it is."""
+    games = sum(each.games for each in nets)
+    tiles: list[list[Tile]] = []
+    south_m: float | None = None  # of the next tile's southern end
+    for net in nets:
+        location = parse_xml(net.net_file).find("location")
+        corners = "0,0,0,0" if location is None or games == 1 else location.get("convBoundary", "0,0,0,0")
+        _, low, _, high = (float(each) for each in corners.split(","))
+        between_m = float(round(high - low + _GAP_M)) if location is not None and games > 1 else 0.0
+        first_m = 0.0 if south_m is None else float(ceil(south_m - low))
+        names = [f"g{sum(map(len, tiles)) + k}_" if games > 1 else "" for k in range(net.games)]
+        offsets = [first_m + between_m * k for k in range(net.games)]
+        tiles.append(
+            [
+                Tile(net_file=net.net_file, prefix=name, offset_m=offset_m, junctions=net.junctions)
+                for name, offset_m in zip(names, offsets, strict=True)
+            ]
+        )
+        south_m = first_m + between_m * net.games + low
+    return tiles
 
 
-def tiled_net(net_file: Path, games: int, junctions: Collection[str] | None = None) -> Path:
-    """A net with G = `games` tiles of the scene's net, cut down to these junctions and their edges if they are given.
-
-    One game on the whole net needs no copy; other nets are files of the cache.
-    """
-    if games == 1 and junctions is None:
-        return net_file
+def tiled_net(tiles: Sequence[Tile]) -> Path:
+    """A net with these tiles, which is a file of the cache; a single tile of a whole net needs no copy."""
+    first = tiles[0]
+    if len(tiles) == 1 and first.junctions is None:
+        return first.net_file
 
     def write(file: Path) -> None:
-        _LOGGER.info("copying the network %d times, once per scene", games, extra={"done": 0, "total": games + 1})
-        prefixes = [tile_prefix(game, games) for game in range(games)]
-        write_tiles(net_file, file, prefixes=prefixes, offset_m=tile_offset_m(net_file, games), junctions=junctions)
+        total = len(tiles) + 1
+        _LOGGER.info("copying the network %d times, once per scene", len(tiles), extra={"done": 0, "total": total})
+        write_tiles(tiles, file)
 
-    key = (games, _GAP_M, _FORMAT, None if junctions is None else sorted(junctions))
-    return cached_file("tiles/.net.xml", net_file, key, write)
+    digests = {file: sha256(file.read_bytes()).hexdigest() for file in {each.net_file for each in tiles}}
+    parts = [(digests[each.net_file], each.junctions and sorted(each.junctions)) for each in tiles]
+    places = [(each.prefix, each.offset_m) for each in tiles]
+    return cached_file("tiles/.net.xml", first.net_file, (parts, places, _FORMAT), write)
+
+
+def nets_can_share(first: Path, second: Path) -> bool:
+    """Whether tiles of two nets can be in one net: what SUMO reads of a net as a whole is equal."""
+    return first == second or _of_the_whole(first) == _of_the_whole(second)
+
+
+def _of_the_whole(net_file: Path) -> tuple[str | None, bool, list[bytes]]:
+    """The format's version, the side of the road, and the types of edges. netconvert alone reads other attributes."""
+    root = parse_xml(net_file)
+    types = [ElementTree.tostring(each).strip() for each in root.findall("type")]
+    return root.get("version"), root.get("lefthand") in ("true", "1"), types
