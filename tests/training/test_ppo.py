@@ -20,7 +20,7 @@ from harness.config.training import Training
 from harness.drivers.mixture import mixture_of
 from harness.drivers.policy_file import LearnedDriver, write_policy
 from harness.drivers.sumo import SumoDriver
-from harness.environments.vector_env import ArenaVecEnv
+from harness.environments.vector_env import ArenaVecEnv, JoinedVecEnv
 from harness.game.initial_state import StartDistribution
 from harness.game.observation_layout import OF_OTHERS, SIZE
 from harness.game.payoff_terms import TERMS
