@@ -1,13 +1,16 @@
-"""How egos drive on roads on which they did not learn, as a Markdown table.
+"""How egos drive on roads on which they did not learn.
 
-    python docs/roads/held_out.py reports/roads/one-road reports/roads/nine-roads
+    python docs/roads/held_out.py play                   # draws roads, trains egos, and plays them: an hour on one core
+    python docs/roads/held_out.py table reports/roads    # the results as a Markdown table
 
-prints for each league on varied roads, and each person there, the share of games in which the ego fails, the roads with
-a failure, and the failures on the worst road.
+One ego learns on the road of a scene (the naive ego of its published campaign), the other also on eight variants of it.
+Both play on ten other variants. The table has for each of them, and each person there, the share of games in which the
+ego fails, the roads with a failure, and the failures on the worst road.
 """
 
 from __future__ import annotations
 
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
@@ -17,26 +20,53 @@ from scipy.stats import binomtest
 
 from harness.evaluation.tables import read_csv
 
-HEADER = ("league", "beside", "roads", "games", "ego fails", "roads with a failure", "worst road")
+SCENES = ("merge", "left_across", "priority_crossing")
+SEED, GAMES = 21, 20
+LEARNED, HELD_OUT = range(1, 9), range(101, 111)
+FOLDER = Path("reports/roads")
+HEADER = ("scene", "ego learned on", "beside", "roads", "games", "ego fails", "roads with a failure", "worst road")
+app = typer.Typer(no_args_is_help=True, add_completion=False)
 
 
-def main(leagues: Annotated[list[Path], typer.Argument(metavar="LEAGUE...", help="Folders of leagues.")]) -> None:
+@app.command()
+def play() -> None:
+    """Draw the roads, train the egos, and play their leagues. Run it again to continue."""
+    for scene in SCENES:
+        for seeds, folder in ((LEARNED, FOLDER / "learned"), (HELD_OUT, FOLDER / "held-out")):
+            if not (folder / f"{scene}_road{seeds[0]}").is_dir():
+                _run("scene", "vary", scene, "--roads", len(seeds), "--seed", seeds[0], "--out", folder)
+        campaign = FOLDER / f"{scene}-nine-roads"
+        _run("campaign", f"docs/roads/{scene}.toml", "--out", campaign)
+        roads = ",".join(str(FOLDER / "held-out" / f"{scene}_road{seed}") for seed in HELD_OUT)
+        for run, words in ((Path("reports") / scene, "one-road"), (campaign, "nine-roads")):
+            ego = run / "policies" / f"naive-seed{SEED}"
+            out = FOLDER / f"{scene}-learned-on-{words}"
+            _run("league", "--ego", ego, "--scenes", roads, "--episodes", GAMES, "--out", out)
+
+
+def _run(*words: object) -> None:
+    subprocess.run(["harness", *map(str, words)], check=True)
+
+
+@app.command()
+def table(folder: Annotated[Path, typer.Argument(help="The folder of the leagues.")] = FOLDER) -> None:
     """Print the table."""
-    rows = [row for league in leagues for row in rows_of(league)]
+    rows = [row for scene in SCENES for words in ("one-road", "nine-roads") for row in rows_of(folder, scene, words)]
     print("\n".join("| " + " | ".join(cells) + " |" for cells in (HEADER, ["---"] * len(HEADER), *rows)))
 
 
-def rows_of(league: Path) -> Iterator[list[str]]:
+def rows_of(folder: Path, scene: str, words: str) -> Iterator[list[str]]:
     """A row for each person of a league: all roads together."""
-    table = read_csv(league / "league.csv")
-    for person, rows in table.groupby("person", sort=True):
+    league = read_csv(folder / f"{scene}-learned-on-{words}" / "league.csv")
+    for person, rows in league.groupby("person", sort=True):
         failed = (rows["failure_rate"] * rows["episodes"]).round().astype(int)
         games, failures = int(rows["episodes"].sum()), int(failed.sum())
         low, high = binomtest(failures, games).proportion_ci()
         share = f"{failures / games:.1%} ({low:.1%} to {high:.1%})"
         worst = f"{failed.max()} of {rows.loc[failed.idxmax(), 'episodes']}"
-        yield [league.name, str(person), str(len(rows)), str(games), share, str(int((failed > 0).sum())), worst]
+        with_failure = str(int((failed > 0).sum()))
+        yield [scene, words, str(person), str(len(rows)), str(games), share, with_failure, worst]
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    app()
