@@ -38,19 +38,28 @@ _SEED = "-seed"
 
 
 def open_league(
-    ego: str, scenes: Sequence[str], folder: Path, *, episodes: int, allow_code: bool = False
+    ego: str,
+    scenes: Sequence[str],
+    folder: Path,
+    *,
+    episodes: int,
+    shield: str | None = None,
+    allow_code: bool = False,
 ) -> list[OpenCampaign]:
     """Write the campaigns of a league into its folder, and open them. `scenes` are names or folders; none: every
-    shipped scene. Raises UsageError with every problem found."""
+    shipped scene. With a `shield`, the ego plays each game with it too. Raises UsageError with every problem found."""
     problems: list[Problem] = []
     names = scenes or shipped_names("networks")
     found = [collect(problems, partial(_scene_at, each)) for each in names]
     driver = collect(problems, partial(_driver, ego, folder / _EGOS, allow_code))
+    if ego == SUMO and shield is not None:
+        message = "SUMO drives this ego, and has no decision that a shield could check"
+        problems.append(Problem("--shield", "", message, "leave it out, or name another ego"))
     if problems or driver is None:
         raise UsageError(problems)
     opened = []
     for scene in dict.fromkeys(filter(None, found)):
-        for campaign in _campaigns(scene, driver, episodes):
+        for campaign in _campaigns(scene, {"driver": driver} | ({"shield": shield} if shield else {}), episodes):
             file = folder / _CAMPAIGNS / f"{campaign['name']}.toml"
             make_folder(file.parent)
             write_atomically(file, tomli_w.dumps(campaign).encode())
@@ -87,8 +96,8 @@ def _scene_at(written: str) -> Path:
     return place
 
 
-def _campaigns(scene: Path, driver: str, episodes: int) -> Iterator[Mapping[str, Any]]:
-    shared = {"scene": str(scene), "ego": {"driver": driver}, "assessment": {"episodes": episodes}}
+def _campaigns(scene: Path, ego: Mapping[str, str], episodes: int) -> Iterator[Mapping[str, Any]]:
+    shared = {"scene": str(scene), "ego": ego, "assessment": {"episodes": episodes}}
     people = people_of(scene)
     if not people:
         yield {"name": scene.name, "personas": [], **shared}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -26,6 +26,10 @@ def league(
         typer.Option(
             metavar="A,B", help="Names or folders of scenes, joined by commas.  [default: every shipped scene]"
         ),
+    ] = None,
+    shield: Annotated[
+        Literal["rss"] | None,
+        typer.Option(metavar="RULE", help="Play each game with a shield around the ego, too: `rss` (docs/shield.md)."),
     ] = None,
     episodes: Annotated[int, typer.Option(min=2, metavar="N", help="Games of each pairing.")] = 100,
     out: Annotated[
@@ -54,9 +58,9 @@ def league(
 
             folder = out or Path("reports") / f"league-{name_of(ego)}"
             names = [each.strip() for each in scenes.split(",")] if scenes is not None else []
-            campaigns = open_league(ego, names, folder, episodes=episodes, allow_code=allow_code)
+            campaigns = open_league(ego, names, folder, episodes=episodes, shield=shield, allow_code=allow_code)
         outcome = play_league(name_of(ego), campaigns, folder, partial(WorkerPool, jobs=jobs or cores()), console)
-        console.print(league_terminal(outcome.table))
+        console.print(league_terminal(name_of(ego), outcome.table))
         print_plain([f"League: {folder / 'league.html'}"], console)
         if as_json:
             print_json({"league": str(folder), **outcome.record})

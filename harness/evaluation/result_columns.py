@@ -158,7 +158,7 @@ FALSIFICATION = (
 NOBODY, SUMO_DRIVER = "nobody", "sumo"
 """The column `person` of arms without a persona."""
 LEAGUE_PAIRING = (
-    Column("ego", TEXT, "The ego of the league."),
+    Column("ego", TEXT, "The ego of the league, or this ego `with shield`."),
     Column("scene", TEXT, "The scene."),
     Column("person", TEXT, "`nobody`, `sumo` (SUMO's driver in the person's seat), or the persona."),
 )

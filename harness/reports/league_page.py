@@ -30,11 +30,12 @@ def render_league(ego: str, table: pd.DataFrame, addresses: Sequence[str], faile
     says what could not be played."""
     rows = table.to_dict("records")
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
+    egos = sorted({row["ego"] for row in rows})
     people = sorted({row["person"] for row in rows} - {NOBODY, SUMO_DRIVER})
     columns = [each for each in (NOBODY, SUMO_DRIVER, *people) if each in {row["person"] for row in rows}]
-    cells: dict[tuple[str, str], list[FailureCell]] = {}
+    cells: dict[tuple[str, str, str], list[FailureCell]] = {}
     for row, address in zip(rows, addresses, strict=True):
-        cells.setdefault((row["scene"], row["person"]), []).append(_cell(row, address))
+        cells.setdefault((row["scene"], row["ego"], row["person"]), []).append(_cell(row, address))
     return (
         environment_of("reports")
         .get_template("league.html.jinja")
@@ -42,17 +43,21 @@ def render_league(ego: str, table: pd.DataFrame, addresses: Sequence[str], faile
             ego=ego,
             games=int(table["episodes"].sum() - table["errors"].sum()),
             columns=[person_in_words(each) for each in columns],
-            lines=[(scene, [cells.get((scene, person), []) for person in columns]) for scene in scenes],
+            lines=[
+                (_scene_of(scene, each, ego), [cells.get((scene, each, person), []) for person in columns])
+                for scene in scenes
+                for each in egos
+            ],
             headings=HEADINGS,
             tones=RISK_TONES,
-            rows=[(address, list(_texts(row))) for row, address in zip(rows, addresses, strict=True)],
+            rows=[(address, list(_texts(row, ego))) for row, address in zip(rows, addresses, strict=True)],
             failed=failed,
             not_answered=dict.fromkeys((row["scene"], row["reason"]) for row in rows if row["reason"]),
         )
     )
 
 
-def league_terminal(table: pd.DataFrame) -> Table:
+def league_terminal(ego: str, table: pd.DataFrame) -> Table:
     """The twelve worst rows for the terminal."""
     from rich.table import Table
 
@@ -61,7 +66,7 @@ def league_terminal(table: pd.DataFrame) -> Table:
         shown.add_column(heading, overflow="fold")
     for row in table.head(12).to_dict("records"):
         style = "dim" if row["reason"] else "red" if row["failure_rate"] > _MUCH else None
-        shown.add_row(*list(_texts(row))[:5], style=style)
+        shown.add_row(*list(_texts(row, ego))[:5], style=style)
     return shown
 
 
@@ -82,9 +87,8 @@ def sentence_of(row: Mapping[Any, Any]) -> str:
     """What a row of the table says, in a sentence."""
     low, high = row["failure_rate_low"], row["failure_rate_high"]
     who = f"against {person_in_words(row['person'])} in {row['scene']}"
-    fails = (
-        f"The ego fails in {_counts(row)} games {who}: {percent(row['failure_rate'])} (95 %: {interval(low, high)})."
-    )
+    rate = f"{percent(row['failure_rate'])} (95 %: {interval(low, high)})"
+    fails = f"{row['ego']} fails in {_counts(row)} games {who}: {rate}."
     return f"{fails} Not answered: {row['reason']}." if row["reason"] else fails
 
 
@@ -114,8 +118,13 @@ def _counts(row: Mapping[Any, Any]) -> str:
     return f"{_failures(row)} of {row['episodes'] - row['errors']}"
 
 
-def _texts(row: Mapping[Any, Any]) -> Iterator[str]:
-    yield row["scene"]
+def _scene_of(scene: str, played_by: str, ego: str) -> str:
+    """A scene, and what an ego of the league has besides the one that the page is about: its shield."""
+    return scene + played_by.removeprefix(ego)
+
+
+def _texts(row: Mapping[Any, Any], ego: str) -> Iterator[str]:
+    yield _scene_of(row["scene"], row["ego"], ego)
     yield person_in_words(row["person"])
     yield f"{percent(row['failure_rate'])} ({_counts(row)})"
     yield interval(row["failure_rate_low"], row["failure_rate_high"])

@@ -109,7 +109,7 @@ def test_files_for_ci__have_each_pairing(league: Path) -> None:
     assert (result["exit_code"], result["failed"], len(result["rows"])) == (0, [], 6)
     junit = (league / "junit.xml").read_text(encoding="utf-8")
     assert 'tests="6"' in junit
-    assert "The ego fails in 3 of 3 games against nobody in red_light: 100" in junit
+    assert "brake fails in 3 of 3 games against nobody in red_light: 100" in junit
 
 
 def test_table__the_same_ego_by_another_name_shares_the_rank(league: Path, tmp_path: Path) -> None:
@@ -128,4 +128,4 @@ def test_table__the_same_ego_by_another_name_shares_the_rank(league: Path, tmp_p
 def test_table__one_league_is_no_table(league: Path) -> None:
     done = CliRunner().invoke(app, ["league-table", str(league.parent)])
     assert isinstance(done.exception, UsageError)
-    assert "has fewer than two leagues: out" in str(done.exception)
+    assert "has fewer than two egos: out" in str(done.exception)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
 
-from harness.campaign.results.league_rows import person_of
+from harness.campaign.plan.stages import AssessmentStage
+from harness.campaign.results.league_rows import ego_in, person_in
+from harness.campaign.storage.manifest import planned
 from harness.campaign.storage.run_folder import MANIFEST, RunFolder
 from harness.config.campaign import Assessment
 from harness.errors import UsageError
@@ -22,13 +25,13 @@ SIGNIFICANCE = Assessment().significance
 def rank_leagues(folder: Path) -> tuple[pd.DataFrame, Path]:
     """Rank the egos of the leagues in a folder, and write the table `league_ranks` there: the table, and its file.
 
-    Raises UsageError if the folder has fewer than two leagues, or if no game was played by all of their egos.
+    Raises UsageError if the leagues of the folder have fewer than two egos, or if no game was played by all egos.
     """
     leagues = sorted(file.parent for file in folder.glob(f"*/{LEAGUE}"))
-    if len(leagues) < 2:
+    games = pd.concat([_games_of(league) for league in leagues], ignore_index=True) if leagues else None
+    if games is None or games["ego"].nunique() < 2:
         found = ", ".join(each.name for each in leagues) or "none"
-        raise UsageError.of(folder, "", f"has fewer than two leagues: {found}", "play some: harness league --ego EGO")
-    games = pd.concat([_games_of(league) for league in leagues], ignore_index=True)
+        raise UsageError.of(folder, "", f"has fewer than two egos: {found}", "play some: harness league --ego EGO")
     table = league_ranks(games, SIGNIFICANCE)
     if not table["games"].any():
         remedy = "play the same scenes: harness league --scenes"
@@ -40,14 +43,16 @@ def rank_leagues(folder: Path) -> tuple[pd.DataFrame, Path]:
 def _games_of(league: Path) -> pd.DataFrame:
     """The games of the scenes of a league, as `league_ranks` reads them: each game alone or beside SUMO's driver once,
     though it is played for people of every training seed."""
-    ego = str(read_csv(league / LEAGUE)["ego"].iloc[0])
+    ego = min(read_csv(league / LEAGUE)["ego"].unique(), key=len)  # with its shield it has a longer name
     found = []
     for file in sorted(league.glob(f"*/{MANIFEST}")):
         run = RunFolder(file.parent)
         episodes = read_csv(run.path / "episodes.csv")
         played = episodes[(episodes["error"] == "") & episodes["ego_failed"].notna()]
-        people = [person_of(arm, persona) for arm, persona in zip(played["arm"], played["persona"], strict=True)]
-        named = played.assign(scene=scene_of(run.manifest()), person=people, ego=ego)
+        manifest = run.manifest()
+        arms = {stage.name: stage.arm for stage in planned(manifest) if isinstance(stage, AssessmentStage)}
+        people, egos = ({name: of(arm) for name, arm in arms.items()} for of in (person_in, partial(ego_in, ego=ego)))
+        named = played.assign(scene=scene_of(manifest), person=played["arm"].map(people), ego=played["arm"].map(egos))
         found.append(named.assign(seed=named["seed"].where(named["persona"] != "", 0)))
     games = pd.concat(found, ignore_index=True)
-    return games.drop_duplicates(GAME)[[*GAME, "ego", "ego_failed"]]
+    return games.drop_duplicates([*GAME, "ego"])[[*GAME, "ego", "ego_failed"]]

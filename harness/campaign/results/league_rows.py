@@ -1,4 +1,5 @@
-"""The rows of a league: one for each pairing of its ego with a person in a scene, from the tables of the campaigns."""
+"""The rows of a league, from the tables of its campaigns: one for each pairing of the ego with a person in a scene, and
+one for the ego with its shield."""
 
 from __future__ import annotations
 
@@ -16,13 +17,12 @@ from harness.evaluation.comparisons.comparison import games_by_arm, rate_cells
 from harness.evaluation.comparisons.preventability import by_regulation
 from harness.evaluation.competence import gate
 from harness.evaluation.result_columns import NOBODY, SUMO_DRIVER
-from harness.evaluation.strategies import NAIVE_ALONE, NAIVE_VS_SUMO
+from harness.evaluation.strategies import Arm, ShieldedEgo, SumoNonEgo, strategy_name
 from harness.evaluation.tables import read_csv
 from harness.evaluation.worst_first import worst_first
 from harness.reports.embedding import key
 from harness.reports.provenance import scene_of
 
-_PLACED = {NAIVE_ALONE.name: NOBODY, NAIVE_VS_SUMO.name: SUMO_DRIVER}
 _COPIED = (
     *("arm", "seed", "episodes", "errors", "failure_rate", "failure_rate_low", "failure_rate_high"),
     *("collisions", "rails", "timeouts", "mean_speed_mps"),
@@ -42,17 +42,29 @@ def league_rows(
     return list(_each_once(rows)), games
 
 
-def person_of(arm: str, persona: str) -> str:
-    return _PLACED.get(arm, persona)
+def person_in(arm: Arm) -> str:
+    """What a league calls the person of an arm."""
+    match arm.non_ego:
+        case None:
+            return NOBODY
+        case SumoNonEgo():
+            return SUMO_DRIVER
+        case _:
+            return strategy_name(arm.non_ego)
+
+
+def ego_in(arm: Arm, ego: str) -> str:
+    """What a league calls the ego of an arm: its name, and whether it has its shield."""
+    return f"{ego} with shield" if isinstance(arm.ego, ShieldedEgo) else ego
 
 
 def _each_once(rows: Sequence[Mapping[str, Any]]) -> Iterator[Mapping[str, Any]]:
     """The rows without repetitions: for every training seed of the people, nobody and SUMO's driver meet the ego in the
     same games."""
-    seen = set[tuple[str, str]]()
+    seen = set[tuple[str, str, str]]()
     for row in rows:
-        pairing = (row["scene"], row["person"])
-        if row["person"] not in _PLACED.values() or pairing not in seen:
+        pairing = (row["scene"], row["person"], row["ego"])
+        if row["person"] not in (NOBODY, SUMO_DRIVER) or pairing not in seen:
             yield row
         seen.add(pairing)
 
@@ -70,14 +82,15 @@ def _rows(ego: str, run: RunFolder, games: dict[tuple[str, str, int], str]) -> I
     page = (run.path / "report.html").read_text(encoding="utf-8")
     for row in summary.to_dict("records"):
         arm, seed = row["arm"], row["seed"]
-        person = person_of(arm, row["persona"])
-        if row["failure_rate"] != row["failure_rate"] and not row["errors"]:
-            continue  # a persona alone
+        if arms[arm].ego is None:
+            continue
+        person = person_in(arms[arm])
         of_arm = games_of[arm, seed]
         played = of_arm[of_arm["error"] == ""]
         brakes = manoeuvres[(manoeuvres["arm"] == arm) & (manoeuvres["seed"] == seed)]
         hard = brakes[(brakes["player"] == "ego") & (brakes["manoeuvre"] == "hard_brake")]["episode"].nunique()
-        cells = {name: row[name] for name in _COPIED} | {"ego": ego, "scene": scene, "person": person}
+        cells = {name: row[name] for name in _COPIED} | {"scene": scene, "person": person}
+        cells["ego"] = ego_in(arms[arm], ego)
         cells |= {"serious_injuries": played["mais3_risk_high"].sum() / len(played) if len(played) else np.nan}
         cells |= rate_cells("hard_brake_rate", hard, len(played))
         cells["reason"] = "" if person == NOBODY else gate(alone_bounds(campaign, arms[arm]), seed, games_of)["reason"]

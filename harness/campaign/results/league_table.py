@@ -49,8 +49,8 @@ def write_league(ego: str, folder: Path, results: Mapping[str, RunResult]) -> Le
     runs = [RunFolder(folder / name) for name in results]
     rows, games = league_rows(ego, [run for run in runs if (run.path / "summary.csv").is_file()])
     table = table_of("league", rows).sort_values(
-        ["reason", "failure_rate", "serious_injuries", "scene", "person", "seed"],
-        ascending=[True, False, False, True, True, True],
+        ["reason", "failure_rate", "serious_injuries", "scene", "person", "seed", "ego"],
+        ascending=[True, False, False, True, True, True, True],
         key=lambda column: column != "" if column.name == "reason" else column,
         kind="stable",
         ignore_index=True,
@@ -88,7 +88,8 @@ def _write_junit(ego: str, file: Path, table: pd.DataFrame, results: Mapping[str
     cases = []
     for row in table.to_dict("records"):
         error = f"{row['errors']} of {row['episodes']} games could not be played" if row["errors"] else ""
-        name, group = f"{row['person']}, seed {row['seed']}", f"league.{row['scene']}"
+        name = f"{row['person']}, seed {row['seed']}" + row["ego"].removeprefix(ego)
+        group = f"league.{row['scene']}"
         cases.append(case_of(name, group, error=error, details=sentence_of(row)))
     for name, result in results.items():
         for stage, reason in result.failed_stages.items():
