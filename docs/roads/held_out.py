@@ -5,7 +5,8 @@
 
 One ego learns on the road of a scene (the naive ego of its published campaign), the other also on eight variants of it.
 Both play on ten other variants. The table has for each of them, and each person there, the share of games in which the
-ego fails, the roads with a failure, and the failures on the worst road.
+ego fails, the roads with a failure, and the failures on the worst road. Beside others, roads on which the ego fails
+alone are left out: they say nothing about how it copes with others.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from typing import Annotated
 import typer
 from scipy.stats import binomtest
 
+from harness.evaluation.result_columns import NOBODY
 from harness.evaluation.tables import read_csv
 
 SCENES = ("merge", "left_across", "priority_crossing")
@@ -56,9 +58,12 @@ def table(folder: Annotated[Path, typer.Argument(help="The folder of the leagues
 
 
 def rows_of(folder: Path, scene: str, words: str) -> Iterator[list[str]]:
-    """A row for each person of a league: all roads together."""
+    """A row for each person of a league, all roads together; beside others, roads on which the ego fails alone are left
+    out."""
     league = read_csv(folder / f"{scene}-learned-on-{words}" / "league.csv")
-    for person, rows in league.groupby("person", sort=True):
+    alone = league[league["person"] == NOBODY].set_index("scene")["failure_rate"]
+    for person, of_person in league.groupby("person", sort=True):
+        rows = of_person if person == NOBODY else of_person[of_person["scene"].map(alone) == 0.0]
         failed = (rows["failure_rate"] * rows["episodes"]).round().astype(int)
         games, failures = int(rows["episodes"].sum()), int(failed.sum())
         low, high = binomtest(failures, games).proportion_ci()

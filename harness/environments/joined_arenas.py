@@ -32,7 +32,12 @@ def open_arenas(parts: Sequence[SeatedGames], *, seed: int) -> list[Arena]:
         for part, of_part in zip(parts, seats, strict=True)
     ]
     simulations = open_simulations(played, seed=seed)
-    return [
-        Arena(part.scene, part.games, of_part, simulation=simulation)
-        for part, of_part, simulation in zip(parts, seats, simulations, strict=True)
-    ]
+    try:
+        return [
+            Arena(part.scene, part.games, of_part, simulation=simulation)
+            for part, of_part, simulation in zip(parts, seats, simulations, strict=True)
+        ]
+    except BaseException:
+        for each in simulations:
+            each.close()
+        raise
