@@ -42,7 +42,7 @@ def training_spec(settings: Training) -> TrainingSpec:
     opponent = persona(_OPPONENT)
     driver = LearnedDriver(coasting_policy(), sampled=opponent.decisions == "sampled")
     return TrainingSpec(
-        persona=persona("careful"),
+        personas=(persona("careful"),),
         places=(LearningPlace(scene=merge_scene(), player=EGO, drivers=(None, mixture_of(driver, opponent))),),
         alone_share=Retraining().alone_share,
         attentive_share=0.0,

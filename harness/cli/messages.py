@@ -60,6 +60,7 @@ def ego(campaign: OpenCampaign) -> str:
 def work(campaign: OpenCampaign, stages: Sequence[Stage]) -> str:
     """How many trainings and arms there are."""
     from harness.campaign.plan.stages import AssessmentStage, RejectionGate, TrainingStage
+    from harness.campaign.plan.strategy_stages import training_settings
 
     document = campaign.document
     trainings = [stage for stage in stages if isinstance(stage, TrainingStage)]
@@ -67,7 +68,8 @@ def work(campaign: OpenCampaign, stages: Sequence[Stage]) -> str:
     of_arms = [stage for stage in stages if isinstance(stage, AssessmentStage)]
     rejected = sum(any(isinstance(gate, RejectionGate) for gate in stage.gates) for stage in of_arms)
     if campaign.policies is None:
-        parts = [f"{_counted(len(trainings) - responses, 'training')} of up to {document.training.steps:,} steps"]
+        most = max((training_settings(document, each).steps for each in trainings), default=document.training.steps)
+        parts = [f"{_counted(len(trainings) - responses, 'training')} of up to {most:,} steps"]
     else:
         parts = [f"Trained players are read from {campaign.policies}: nothing is trained"]
     if document.best_response is not None:

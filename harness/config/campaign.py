@@ -85,8 +85,9 @@ class Rounds(Document):
     on, the player goes on with the best of its new policy and all its earlier ones, by as many games as an arm has,
     none of which is a game of the assessment."""
 
-    count: int = Field(2, ge=2, le=20)
-    """Number of the last round. The non-ego learns in odd rounds, the ego in even rounds. The paper has 2 rounds."""
+    count: int = Field(2, ge=1, le=20)
+    """Number of the last round. The non-ego learns in odd rounds, the ego in even rounds. The paper has 2 rounds. 1: no
+    ego is retrained against a persona alone, only one against several (`retraining.against`)."""
     personas: list[Name] = Field([], max_length=50)
     """Names of the personas with rounds after round 2. Left out: all personas."""
     against: Literal["latest", "all", "equilibrium"] = "latest"

@@ -11,7 +11,7 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -113,20 +113,23 @@ def policy_files(folder: Path) -> tuple[Path, Path]:
     return folder / "policy.json", folder / "policy.safetensors"
 
 
-def read_policy(folder: str | Path) -> Policy:
-    """Read a policy's folder. Raises UsageError if it is missing, damaged, or was made for other observations.
+def read_policy(folder: str | Path, layout: Sequence[str] = LAYOUT) -> Policy:
+    """Read a policy's folder. Raises UsageError if it is missing, damaged, or was made for other observations than
+    those with the names `layout`.
 
     >>> read_policy("policies/paper_merge/naive-seed11").card["player"]
     'ego'
     """
     card_file, tensor_file = policy_files(Path(folder))
     card = read_card(Path(folder))
-    if card["format"] != FORMAT or card["observation"] != list(LAYOUT):
-        message = "its format or its observation layout is not that of this version"
-        raise UsageError.of(card_file, "observation", message, "train it again")
+    if card["format"] != FORMAT or card["observation"] != list(layout):
+        message, remedy = "its format or its observation layout is not that of this version", "train it again"
+        if card.get("personas"):
+            message, remedy = "is a policy of several personas", "name that of one of them, from the folder beside it"
+        raise UsageError.of(card_file, "observation", message, remedy)
     try:
         policy = Policy(load_tensors(_content(tensor_file, _MAX_TENSOR_BYTES)), card)
-        _check_tensors(policy)
+        _check_tensors(policy, len(layout))
     except (SafetensorError, ValueError, LookupError, TypeError, AttributeError, OverflowError, MemoryError) as error:
         raise UsageError.of(tensor_file, "", f"is damaged: {error}", "train the policy again") from None
     return policy
@@ -155,7 +158,7 @@ def _content(file: Path, max_bytes: int) -> bytes:
         raise UsageError.of(file, "", str(error.strerror), _POLICY_FOLDER) from None
 
 
-def _check_tensors(policy: Policy) -> None:
+def _check_tensors(policy: Policy, inputs: int) -> None:
     """Raises ValueError for parameters that are unknown, missing, of another shape, or no plausible numbers."""
     layers = [(match[1], int(match[2])) for match in map(_LAYER.match, policy.tensors) if match]
     expected = {f"{part}.{k}.{kind}" for part, last in layers for k in range(last + 1) for kind in ("weight", "bias")}
@@ -165,7 +168,7 @@ def _check_tensors(policy: Policy) -> None:
     for name in sorted(expected - policy.tensors.keys()):
         raise ValueError(f"there are no parameters {name!r}")
     for part, outputs in (("actor", ACTIONS), ("critic", 1)):
-        width = len(LAYOUT)
+        width = inputs
         for weight, bias in policy.layers(part):
             if weight.ndim != 2 or not weight.size or weight.shape[1] != width or bias.shape != weight.shape[:1]:
                 raise ValueError(f"the {part}'s layers do not fit each other")

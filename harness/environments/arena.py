@@ -100,7 +100,7 @@ class Arena(LiveSimulation):
         players = len(self.seats)
         self.state = State.empty(games, players, len(self.world.right_of_way.signal_links))
         self.observation: FloatArray = np.zeros((games, players, SIZE), dtype=np.float32)
-        self._member = np.zeros((games, players), dtype=np.int64)
+        self.member: IntArray = np.zeros((games, players), dtype=np.int64)  # the seat that a player has in a game
         drivers = [seat.driver for of_player in self.seats for seat in of_player if seat.driver is not None]
         self._has_drivers = any(driver.takes_over for driver in drivers)
         self._noise = np.zeros((games, players, self.world.steps if self._has_drivers else 0, 2))
@@ -239,7 +239,7 @@ class Arena(LiveSimulation):
         for player, seats in enumerate(self.seats):
             for member, seat in enumerate(seats):
                 own = plays[:, player]
-                yield player, seat, own if len(seats) == 1 else own & (self._member[:, player] == member)
+                yield player, seat, own if len(seats) == 1 else own & (self.member[:, player] == member)
 
     def _sliding(self, drove: BoolArray) -> BoolArray:
         """[G, P] players that have crashed and still move."""
@@ -317,7 +317,7 @@ class Arena(LiveSimulation):
         state.friction[game], state.visibility_m[game] = start.friction, start.visibility_m
         state.limit_share[game] = start.limit_share
         state.acceleration_mps2[game] = state.steering_rad[game] = 0.0
-        state.shoulder_glance[game], self._member[game] = start.shoulder_glance, start.member
+        state.shoulder_glance[game], self.member[game] = start.shoulder_glance, start.member
         state.outcome[game], state.lapsed[game], state.step[game] = _RUNNING, False, 0
         self.nearby.place(game, start)
         for player in range(len(self.seats)):

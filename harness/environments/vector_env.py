@@ -63,7 +63,8 @@ class ArenaVecEnv(GamesVecEnv):
     """G games of one learner, as Stable-Baselines3's `VecEnv`. A game ends when the learner's part in it ends.
 
     Observation: Box(-1, 1, (98,), float32) per game, [G, 98]; entries as in
-    `harness.environments.gymnasium_env.DrivingEnv`.
+    `harness.environments.gymnasium_env.DrivingEnv`. A learner with several seats has one entry more for each: 1 for
+    the one that it has in this game, else 0.
 
     Action: Box(-1, 1, (2,), float32) per game, [G, 2]: pedals and wheel.
 
@@ -91,7 +92,9 @@ class ArenaVecEnv(GamesVecEnv):
         *parts: str | int,
         payoff_scale: float = 1.0,
     ) -> None:
-        super().__init__(arena.games, OBSERVATION_SPACE, ACTION_SPACE)
+        self._seats = len(arena.seats[learner])
+        inputs = SIZE + (self._seats if self._seats > 1 else 0)
+        super().__init__(arena.games, space_of(inputs), ACTION_SPACE)
         self.arena, self.learner, self._payoff_scale = arena, learner, payoff_scale
         self._actions = np.zeros((arena.games, len(arena.seats), ACTIONS))
         self._finished: list[Finished] = []
@@ -108,7 +111,7 @@ class ArenaVecEnv(GamesVecEnv):
     def reset(self) -> FloatArray:
         """Reset every game. Returns observations [G, SIZE]."""
         self._games.reset(range(self.num_envs))
-        return self.arena.observation[:, self.learner].copy()
+        return self._observed()
 
     def step_async(self, actions: FloatArray) -> None:
         """Store the learner's actions [G, 2] for `step_wait`. Raises ValueError for another shape."""
@@ -137,11 +140,20 @@ class ArenaVecEnv(GamesVecEnv):
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         ended = np.flatnonzero(done)
         if len(ended):
+            last = self._observed()
             for game in ended:
-                infos[game] = {"terminal_observation": self.arena.observation[game, self.learner].copy()}
+                infos[game] = {"terminal_observation": last[game]}
                 self._finish(int(game))
             self._games.reset(ended.tolist())
-        return self.arena.observation[:, self.learner].copy(), payoff * self._payoff_scale, done, infos
+        return self._observed(), payoff * self._payoff_scale, done, infos
+
+    def _observed(self) -> FloatArray:
+        """[G, D] what the learner sees, and with several seats which one it has."""
+        seen = self.arena.observation[:, self.learner].copy()
+        if self._seats == 1:
+            return seen
+        which = np.eye(self._seats, dtype=np.float32)[self.arena.member[:, self.learner]]
+        return np.concatenate((seen, which), axis=1)
 
     def take_finished(self) -> list[Finished]:
         """The games that ended since the last call, removed from the list."""
@@ -171,7 +183,7 @@ class JoinedVecEnv(GamesVecEnv):
     def __init__(self, environments: Sequence[ArenaVecEnv]) -> None:
         self.environments = tuple(environments)
         games = [each.num_envs for each in self.environments]
-        super().__init__(sum(games), OBSERVATION_SPACE, ACTION_SPACE)
+        super().__init__(sum(games), self.environments[0].observation_space, ACTION_SPACE)
         self._cuts = np.cumsum(games)[:-1]
 
     def split(self, of_games: np.ndarray) -> list[np.ndarray]:

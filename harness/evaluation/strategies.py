@@ -84,6 +84,14 @@ class PersonaNonEgo:
 
 
 @dataclass(frozen=True, kw_only=True)
+class ManyPersonas:
+    """One policy of several personas, which has the persona as a further input. The non-ego of each persona follows
+    from it."""
+
+    personas: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
 class RoundAnswer:
     """What the training of a later round made of a player, before a selection took or rejected it."""
 
@@ -104,7 +112,7 @@ class BestResponse:
 
 EgoStrategy = OwnEgo | ShieldedEgo | ErrorFreeEgo | OtherEgo | RoundAnswer
 NonEgoStrategy = SumoNonEgo | PersonaNonEgo | RoundAnswer
-Strategy = EgoStrategy | NonEgoStrategy | BestResponse
+Strategy = EgoStrategy | NonEgoStrategy | ManyPersonas | BestResponse
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -187,6 +195,8 @@ def strategy_name(strategy: Strategy) -> str:
             return "sumo"
         case PersonaNonEgo(persona=persona, round=round_, borrowed=borrowed):
             return persona + (f"_round{round_}" if round_ > 1 else "") + _borrowed_name(borrowed)
+        case ManyPersonas():
+            return "people"
         case RoundAnswer(of=of, is_rejected=is_rejected):
             return f"{strategy_name(of)}_{'rejected' if is_rejected else 'answer'}"
         case BestResponse(arm=arm, start=start):
@@ -207,7 +217,7 @@ def player_of(strategy: Strategy) -> int:
             return arm.best_response_of
         case RoundAnswer(of=of):
             return player_of(of)
-        case SumoNonEgo() | PersonaNonEgo():
+        case SumoNonEgo() | PersonaNonEgo() | ManyPersonas():
             return NON_EGO
         case _:
             return EGO

@@ -162,7 +162,7 @@ def _facts(persona: str, is_changed: bool, tables: RunTables) -> list[tuple[str,
         facts.append(("The persona alone on the road", _alone(persona, tables)))
     if is_changed:
         change = tables.change
-        alone = tables.rates_of(Arm(ego=change.ego(against=persona)).name)
+        alone = tables.rates_of(Arm(ego=change.ego(persona)).name)
         facts.append((STILL_DRIVES.format(made=change.made), _counts(alone, f"the {change.made} ego")))
     if any(failures(row) for row in tables.rates_of(NAIVE_ALONE.name).values()):
         facts.append((CAUTION, [FAILS_ALONE.format(naive=tables.naive)]))

@@ -116,7 +116,7 @@ def _worst_opponent(persona: str, tables: RunTables) -> Iterator[KeyFigure]:
     """The opponent of the ego of round 2, among people and best responses, against which it fails most often."""
     if not tables.asked("RQ2", persona):
         return
-    ego = tables.change.ego(against=persona)
+    ego = tables.change.ego(persona)
     known = {name for name, arm in tables.arms.items() if _meets_a_person(arm, ego)}
     rows = {key: row for key, row in tables.rates.items() if key[0] in known and row["failure_rate"] >= 0.0}
     opponents = len({arm for arm, _ in rows})

@@ -22,6 +22,7 @@ from harness.evaluation.strategies import (
     NaiveEgo,
     ReconfiguredEgo,
     RetrainedEgo,
+    RobustEgo,
     Strategy,
     against_persona,
     round_of,
@@ -45,12 +46,13 @@ class Change(NamedTuple):
     """The ego of round 2 in sentences."""
     doing: str
     """What round 2 does, in sentences."""
-    ego: type[RetrainedEgo] | type[ReconfiguredEgo]
-    """The ego of round 2 as a strategy."""
+    ego: Callable[[str], EgoStrategy]
+    """The ego of round 2 as a strategy, by the persona that it meets."""
 
 
-RETRAINED = Change("retrained", "retraining", RetrainedEgo)
-RECONFIGURED = Change("reconfigured", "reconfiguration", ReconfiguredEgo)
+RETRAINED = Change("retrained", "retraining", lambda persona: RetrainedEgo(against=persona))
+RECONFIGURED = Change("reconfigured", "reconfiguration", lambda persona: ReconfiguredEgo(against=persona))
+ROBUST = Change("robust", "retraining against several personas", lambda persona: RobustEgo())
 
 
 def _empty(name: str) -> Callable[[], pd.DataFrame]:
@@ -165,8 +167,10 @@ class RunTables:
     @property
     def change(self) -> Change:
         """What round 2 makes of the ego, if it is played."""
-        reconfigured = any(isinstance(arm.ego, ReconfiguredEgo) for arm in self.arms.values())
-        return RECONFIGURED if reconfigured else RETRAINED
+        egos = {type(arm.ego) for arm in self.arms.values()}
+        if ReconfiguredEgo in egos:
+            return RECONFIGURED
+        return ROBUST if RobustEgo in egos and RetrainedEgo not in egos else RETRAINED
 
     @cached_property
     def played(self) -> pd.DataFrame:
@@ -196,7 +200,7 @@ class RunTables:
         naive = against_persona(NaiveEgo(), persona).name
         if question == "RQ1":
             return NAIVE_ALONE.name, naive
-        return naive, against_persona(self.change.ego(against=persona), persona).name
+        return naive, against_persona(self.change.ego(persona), persona).name
 
     def last_ego(self, persona: str) -> EgoStrategy:
         """The ego of the last round that was played against a persona's non-ego of round 1."""
@@ -208,7 +212,7 @@ class RunTables:
             and arm == against_persona(arm.ego, persona)
             and self.rates_of(name)
         ]
-        return max(made, key=round_of, default=self.change.ego(against=persona))
+        return max(made, key=round_of, default=self.change.ego(persona))
 
     def tests_of(self, question: str, persona: str) -> list[Row]:
         """The rows of `comparisons` on a question about a persona."""

@@ -91,7 +91,7 @@ LABELS = {
     Verdict.NOT_ENOUGH_TRAININGS: f"{NOT_ANSWERED}: not enough trainings",
     **{verdict: verdict.value for verdict in WITHHELD},
 }
-NO_ROUND_2 = "Round 2 was not played: this ego has nothing to train or to tune."
+NO_ROUND_2 = "Round 2 was not played: the campaign trains and tunes no ego in it."
 
 
 @dataclass(frozen=True, kw_only=True)

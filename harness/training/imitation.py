@@ -18,6 +18,7 @@ from harness.drivers.ordinary_walker import OrdinaryWalker
 from harness.drivers.rules_driver import LANE_KEEPER, RulesDriver
 from harness.environments.vector_env import JoinedVecEnv
 from harness.game.arrays import BoolArray, FloatArray
+from harness.game.observation_layout import SIZE
 from harness.game.world import World
 
 _EPOCHS, _MINIBATCH, _LEARNING_RATE = 30, 512, 1e-3
@@ -42,8 +43,8 @@ def imitate(model: PPO, environment: JoinedVecEnv, *, steps: int, deviation: flo
 def _demonstrate(
     environment: JoinedVecEnv, rounds: int, *, discount: float, deviation: float, noise: np.random.Generator
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """What the demonstrators saw [N, SIZE] and did [N, 2], without the noise, in so many steps of every game, and their
-    returns [N]; NaN in games that had not ended."""
+    """What the learner saw [N, D], what the demonstrators did [N, 2], without the noise, in so many steps of every
+    game, and their returns [N]; NaN in games that had not ended."""
     drivers = [_demonstrator(each.arena.world, each.learner) for each in environment.environments]
     games = [np.arange(each.num_envs) for each in environment.environments]
     for driver, own in zip(drivers, games, strict=True):
@@ -52,7 +53,8 @@ def _demonstrate(
     observations, actions, payoffs, ended = [], [], [], []
     for _ in range(rounds):
         of_drivers = zip(drivers, games, environment.split(observation), strict=True)
-        wanted = np.concatenate([driver.decide(own, seen, np.zeros((len(own), 2))) for driver, own, seen in of_drivers])
+        decided = [driver.decide(own, seen[:, :SIZE], np.zeros((len(own), 2))) for driver, own, seen in of_drivers]
+        wanted = np.concatenate(decided)
         observations.append(observation)
         actions.append(wanted)
         environment.step_async(np.clip(wanted + noise.normal(0.0, deviation, wanted.shape), -1.0, 1.0))

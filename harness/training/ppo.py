@@ -131,7 +131,7 @@ def _learner(spec: TrainingSpec, environment: JoinedVecEnv, tensorboard: Path | 
         return model
     with torch.no_grad():  # a learner that is always alone ignores other road users
         for layers in layers_of(model.policy).values():
-            layers[0].weight[:, torch.as_tensor(OF_OTHERS)] = 0.0
+            layers[0].weight[:, torch.as_tensor(np.flatnonzero(OF_OTHERS))] = 0.0
     return model
 
 

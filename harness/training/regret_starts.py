@@ -147,7 +147,7 @@ def first_scores(spec: TrainingSpec) -> RegretScores | None:
     drivers: list[Driver] = [*(reference_driver(each, car, lane_width_m) for each in PERSONS), spec.best_known]
     games = PairedRollouts(
         spec.scene,
-        persona=spec.persona,
+        persona=spec.personas[0],
         people=_people(spec),
         games=POOL,
         at_once=spec.settings.games,
@@ -163,7 +163,7 @@ def replays_of(spec: TrainingSpec, scores: RegretScores | None) -> RegretReplays
     """The replays of a training that has these scores so far; None without scores."""
     if scores is None:
         return None
-    return RegretReplays(seeded_starts(spec.scene, spec.persona, _people(spec), 0.0, _parts(spec)), scores)
+    return RegretReplays(seeded_starts(spec.scene, spec.personas[0], _people(spec), 0.0, _parts(spec)), scores)
 
 
 def _people(spec: TrainingSpec) -> Sequence[Mixture | None]:

@@ -38,8 +38,9 @@ class LearningPlace:
 class TrainingSpec:
     """The inputs of a training: who learns in which places, beside whom, from which parameters, by which settings."""
 
-    persona: Persona
-    """Of the learner: its payoff and human factors."""
+    personas: tuple[Persona, ...]
+    """Of the learner: its payoff and human factors. Of several, each game has one, in equal shares, and the learner has
+    as many inputs more, which say which."""
     places: tuple[LearningPlace, ...]
     """Each has an equal part of the games. The first one is in the scene of the campaign."""
     alone_share: float
@@ -76,7 +77,7 @@ def open_games(spec: TrainingSpec) -> JoinedVecEnv:
     parts = []
     for number, place in enumerate(spec.places):
         seats = [seats_of(each, paid=False) for each in place.drivers]
-        seats[place.player] = (Seat(None, spec.persona.payoff),)
+        seats[place.player] = tuple(Seat(None, each.payoff) for each in spec.personas)
         own_games = games // places + (number < games % places)
         parts.append(SeatedGames(scene=place.scene, games=own_games, seats=seats))
     environments = []
@@ -113,12 +114,13 @@ def _start_distribution(spec: TrainingSpec, place: LearningPlace, steps: int) ->
     # A learner that overlooks a vehicle without harm learns nothing from it. So it trains with shoulder glances and
     # without looked-but-failed-to-see errors; its persona's own values apply when it drives. Its other limits
     # (reaction, sight, controls) apply from the start of the training.
-    own = spec.persona.human_factors
+    own = [each.human_factors for each in spec.personas]
     human_factors = [factors_of(each) for each in place.drivers]
-    human_factors[place.player] = [own if spec.as_it_drives else own.with_open_eyes]
+    human_factors[place.player] = own if spec.as_it_drives else [each.with_open_eyes for each in own]
     if steps < attentive_steps(spec):
         human_factors = [[replace(each, attention=None) for each in of_player] for of_player in human_factors]
     shares = [shares_of(each) for each in place.drivers]
+    shares[place.player] = [1.0] * len(own)
     starts = place.scene.start_distribution(human_factors, present, shares, ALONG_ROUTE_SHARE)
     return replace(starts, meet_in_place=True)
 
@@ -126,5 +128,6 @@ def _start_distribution(spec: TrainingSpec, place: LearningPlace, steps: int) ->
 def attentive_steps(spec: TrainingSpec) -> float:
     """Steps at the start of the training without lapses of attention; 0 if no persona has lapses."""
     beside = [factors for driver in spec.places[0].drivers for factors in factors_of(driver)]
-    lapses = any(each.attention is not None for each in (spec.persona.human_factors, *beside))
+    own = (each.human_factors for each in spec.personas)
+    lapses = any(each.attention is not None for each in (*own, *beside))
     return spec.attentive_share * spec.settings.steps if lapses else 0.0

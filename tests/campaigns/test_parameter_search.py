@@ -221,7 +221,7 @@ def test_campaign__the_driver_that_was_found_is_an_ego_that_plays_the_same_games
         pd.testing.assert_frame_equal(*rows)
     page = html.unescape((tmp_path / "run" / "report.html").read_text())
     assert "0 and 1: this ego has nothing to train or to tune" in page
-    assert "Round 2 was not played: this ego has nothing to train or to tune." in page
+    assert "Round 2 was not played: the campaign trains and tunes no ego in it." in page
     assert not (tmp_path / "run" / "reconfiguration.csv").exists()
 
 

@@ -19,7 +19,7 @@ from tests.support.tiny import CAREFUL, settings
 def naive_ego(scene: OpenScene) -> TrainingSpec:
     """The naive ego's spec, tiny: three segments."""
     return TrainingSpec(
-        persona=read_document(CAREFUL, Persona),
+        personas=(read_document(CAREFUL, Persona),),
         places=(LearningPlace(scene=scene, player=EGO, drivers=(None, None)),),
         alone_share=1.0,
         attentive_share=0.0,

@@ -13,6 +13,7 @@ from harness.assessment.continuation import Continuation
 from harness.campaign.plan.planned_drivers import BestOf, External, Shielded, borrowed_of, members_of, persona_of
 from harness.campaign.plan.stages import (
     AssessmentStage,
+    ConditioningStage,
     EquilibriumGate,
     PreventabilityStage,
     SearchStage,
@@ -46,7 +47,8 @@ def _inputs(campaign: OpenCampaign, stage: Stage) -> dict[str, Any]:
     """What one stage's numbers depend on, beside the scene and other stages."""
     document = campaign.document
     personas = {"": campaign.ego_persona, **campaign.people}
-    own = [stage.persona] if stage.persona in personas else []
+    learners = stage.personas if isinstance(stage, TrainingStage) else (stage.persona,)
+    own = [each for each in learners if each in personas]
     players = members_of(*(stage.opponent if isinstance(stage, TrainingStage | SearchStage) else stage.drivers))
     givers = [borrowed.of for each in players if (borrowed := borrowed_of(each)) is not None]
     names = dict.fromkeys(["", *own, *map(persona_of, players), *givers])
@@ -59,6 +61,8 @@ def _inputs(campaign: OpenCampaign, stage: Stage) -> dict[str, Any]:
                 inputs["roads"] = [campaign.hashes_of(each) for each in campaign.roads]
             if stage.best_known is not None:
                 inputs["regret"] = {"best_known": repr(stage.best_known), "references": reference_identity()}
+        case ConditioningStage():
+            pass  # the policy that it derives from is one of its needs
         case SearchStage():
             assert campaign.ego_driver is not None
             inputs["reconfiguration"] = document.reconfiguration.record()

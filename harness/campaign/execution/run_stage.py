@@ -18,6 +18,7 @@ from typing import Any
 from harness.campaign.execution.stage_run import Help, StageRun, Task
 from harness.campaign.plan.stages import (
     AssessmentStage,
+    ConditioningStage,
     EquilibriumGate,
     Gate,
     PreventabilityStage,
@@ -81,6 +82,10 @@ def _make(stage: Stage, run: StageRun, scene: OpenScene) -> tuple[dict[str, Any]
             from harness.campaign.execution.training_stage import carry_out_training
 
             return carry_out_training(stage, run, scene)
+        case ConditioningStage():
+            from harness.campaign.execution.conditioning_stage import carry_out_conditioning
+
+            return carry_out_conditioning(stage, run)
         case AssessmentStage():
             from harness.campaign.execution.assessment_stage import carry_out_assessment
 

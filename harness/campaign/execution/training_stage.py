@@ -16,7 +16,9 @@ from harness.campaign.plan.stages import TrainingStage
 from harness.campaign.plan.strategy_stages import training_settings
 from harness.campaign.storage.training_curves import CHECKPOINT
 from harness.campaign.storage.versions import versions_since
+from harness.config.persona import Persona
 from harness.drivers.policy_file import persona_hash, policy_files, read_policy, write_policy
+from harness.drivers.policy_of_many import layout_of_many
 from harness.drivers.policy_origin import origin_card
 from harness.errors import StageFailed
 from harness.evaluation.tables import table_of, write_csv
@@ -68,7 +70,7 @@ def carry_out_training(stage: TrainingStage, run: StageRun, scene: OpenScene) ->
 def _spec(stage: TrainingStage, run: StageRun, scene: OpenScene) -> TrainingSpec:
     context, players = run.context, PlayerFactory(context=run.context, scene=scene)
     return TrainingSpec(
-        persona=context.ego_persona if stage.learner == EGO else context.persona(stage.persona),
+        personas=(context.ego_persona,) if stage.learner == EGO else tuple(map(context.persona, stage.personas)),
         places=(*_places(stage, players), *_places_on_roads(stage, run)),
         alone_share=stage.alone_share,
         attentive_share=stage.attentive_share,
@@ -98,13 +100,19 @@ def _places_on_roads(stage: TrainingStage, run: StageRun) -> Iterator[LearningPl
         yield from _places(stage, PlayerFactory(context=run.context, scene=road))
 
 
+def _persona_card(personas: tuple[Persona, ...]) -> dict[str, Any]:
+    if len(personas) == 1:
+        return {"persona": personas[0].name, "persona_sha256": persona_hash(personas[0])}
+    names = [each.name for each in personas]
+    return {"personas": names, "observation": list(layout_of_many(names))}
+
+
 def _policy_card(stage: TrainingStage, spec: TrainingSpec) -> dict[str, Any]:
     roads = [each.scene.document.name for each in spec.places if each.scene is not spec.scene]
     return {
         "stage": stage.id,
         "player": ROLES[stage.learner],
-        "persona": spec.persona.name,
-        "persona_sha256": persona_hash(spec.persona),
+        **_persona_card(spec.personas),
         **origin_card(spec.scene.document, spec.scene.world, stage.learner),
         "people": len(spec.scene.document.non_ego),
         **({"roads": roads} if roads else {}),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from harness.campaign.plan.stages import TrainingStage
+from harness.campaign.plan.stages import ConditioningStage, TrainingStage
 from harness.config.campaign import Campaign, ego_called
 from harness.evaluation.competence import AloneBound
 from harness.evaluation.strategies import (
@@ -12,6 +12,7 @@ from harness.evaluation.strategies import (
     BestResponse,
     EgoStrategy,
     ErrorFreeEgo,
+    ManyPersonas,
     NaiveEgo,
     OtherEgo,
     PersonaNonEgo,
@@ -43,13 +44,14 @@ def alone_bounds(campaign: Campaign, *arms: Arm) -> tuple[AloneBound, ...]:
     return tuple(dict.fromkeys(found))
 
 
-def bound_of(campaign: Campaign, stage: TrainingStage) -> AloneBound | None:
-    """What the player that a training makes has to achieve alone; None for a best response and an answer.
+def bound_of(campaign: Campaign, stage: TrainingStage | ConditioningStage) -> AloneBound | None:
+    """What the player of a policy has to achieve alone; None for a best response, an answer, and several personas.
 
     A best response is trained in games with its opponent only. It is the answer to one opponent, and not a driver for
     the empty road. An answer of a later round is judged by its selection, and the player that goes on by its arm alone.
+    Of several personas that learned together, each is judged by its own policy.
     """
-    if isinstance(stage.strategy, BestResponse | RoundAnswer):
+    if isinstance(stage.strategy, BestResponse | RoundAnswer | ManyPersonas):
         return None
     (bound,) = _bounds(campaign, stage.strategy)
     return bound
@@ -58,7 +60,9 @@ def bound_of(campaign: Campaign, stage: TrainingStage) -> AloneBound | None:
 def _bounds(campaign: Campaign, strategy: Strategy) -> Iterator[AloneBound]:
     asked = campaign.competence
     match strategy:
-        case SumoNonEgo() | OtherEgo() | BestResponse() | RoundAnswer() | ShieldedEgo() | ErrorFreeEgo():
+        case SumoNonEgo() | OtherEgo() | ShieldedEgo() | ErrorFreeEgo():
+            return
+        case BestResponse() | RoundAnswer() | ManyPersonas():
             return
         case PersonaNonEgo(persona=persona):
             mixed = campaign.mixed_people.get(persona, ())

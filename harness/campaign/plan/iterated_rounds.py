@@ -100,7 +100,7 @@ def persona_rounds(of: SeedStages, persona: str, tunable: bool = False) -> Perso
         egos.extend([ReconfiguredEgo(against=persona)] if tunable else [])
         return rounds
     iterates = not campaign.rounds.personas or persona in campaign.rounds.personas
-    last = campaign.rounds.count if iterates else PAPER_ROUNDS
+    last = campaign.rounds.count if iterates else min(campaign.rounds.count, PAPER_ROUNDS)
     for round_ in range(PAPER_ROUNDS, last + 1):
         learner_is_ego = round_ % 2 == 0
         if learner_is_ego:

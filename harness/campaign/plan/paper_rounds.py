@@ -21,7 +21,7 @@ from collections.abc import Iterator, Sequence
 
 from harness.campaign.plan.alone_bounds import alone_bounds
 from harness.campaign.plan.stages import AssessmentStage, SearchStage, Stage, TrainingStage
-from harness.campaign.plan.strategy_stages import SeedStages, ego_learns
+from harness.campaign.plan.strategy_stages import SeedStages, ego_learns, has_round_2
 from harness.config.campaign import Campaign
 from harness.evaluation.competence import Question, ResearchQuestion
 from harness.evaluation.planned_tests import Family, families
@@ -44,6 +44,7 @@ from harness.evaluation.strategies import (
 def plan_paper_rounds(of: SeedStages, personas: Sequence[str]) -> list[Stage]:
     """The stages of rounds 0 to 2, each after those it needs."""
     learns, alone_share = ego_learns(of.campaign), of.campaign.naive_training.alone_share
+    learns_again = learns and has_round_2(of.campaign)
     stages: list[Stage] = []
     if learns:
         beside = of.side(SumoNonEgo()) if alone_share < 1.0 else ()
@@ -54,18 +55,18 @@ def plan_paper_rounds(of: SeedStages, personas: Sequence[str]) -> list[Stage]:
             )
         )
     trained = dict.fromkeys(filter(None, (*personas, of.traits.baseline)))
-    stages += [of.training(PersonaNonEgo(persona=name), of.side(NaiveEgo()), persona=name) for name in trained]
+    stages += of.people(tuple(trained))
     stages += [of.assessment(NAIVE_ALONE), of.assessment(NAIVE_VS_SUMO)]
     for name in (*personas, *of.campaign.mixed_people):
         retrained = RetrainedEgo(against=name)
-        if learns:
+        if learns_again:
             stages.append(of.training(retrained, of.side(PersonaNonEgo(persona=name)), persona=name))
         if name in personas:
             stages.append(of.assessment(persona_alone(name), persona=name))
         if name in of.traits.lapsing:
             stages.append(of.assessment(persona_alone(name, ATTENTIVE), persona=name))
         stages.append(of.assessment(against_persona(NaiveEgo(), name), persona=name))
-        stages += _round_2_arms(of, retrained) if learns else []
+        stages += _round_2_arms(of, retrained) if learns_again else []
     return stages
 
 
@@ -95,13 +96,16 @@ def _round_2_arms(of: SeedStages, ego: RetrainedEgo | ReconfiguredEgo) -> list[A
 
 
 def questions(campaign: Campaign, personas: Sequence[str], tunable: bool = False) -> list[Question]:
-    """The research questions (paper, section 4.2) for each persona or population and seed; `tunable` as in `plan`."""
+    """The research questions (paper, section 4.2) for each persona or population and seed; `tunable` as in `plan`. The
+    second one is about the ego retrained against the persona; without one, about that retrained against several."""
     asked = []
     for name in [*personas, *campaign.mixed_people]:
         naive = against_persona(NaiveEgo(), name)
         pairs: list[tuple[ResearchQuestion, Arm, Arm]] = [("RQ1", NAIVE_ALONE, naive)]
-        if ego_learns(campaign):
+        if ego_learns(campaign) and has_round_2(campaign):
             pairs.append(("RQ2", naive, against_persona(RetrainedEgo(against=name), name)))
+        elif ego_learns(campaign) and campaign.retraining.against and name in personas:
+            pairs.append(("RQ2", naive, against_persona(RobustEgo(), name)))
         elif tunable:
             pairs.append(("RQ2", naive, against_persona(ReconfiguredEgo(against=name), name)))
         asked += [

@@ -22,6 +22,7 @@ from harness.evaluation.strategies import (
     Arm,
     BestResponse,
     ErrorFreeEgo,
+    ManyPersonas,
     PersonaNonEgo,
     ReconfiguredEgo,
     RetrainedEgo,
@@ -135,6 +136,11 @@ class TrainingStage(_Stage):
         return strategy_name(self.strategy)
 
     @property
+    def personas(self) -> tuple[str, ...]:
+        """The personas that learn: one of them in each game."""
+        return self.strategy.personas if isinstance(self.strategy, ManyPersonas) else (self.persona,)
+
+    @property
     def is_best_response(self) -> bool:
         return isinstance(self.strategy, BestResponse)
 
@@ -152,6 +158,29 @@ class TrainingStage(_Stage):
     def drivers(self) -> tuple[PlannedDriver, ...]:
         policies = (each for each in (self.initial, self.best_known) if each is not None)
         return (*policies, *self.opponent)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConditioningStage(_Stage):
+    """The policy of one persona, from the policy that several learned together."""
+
+    of: Trained
+    together: tuple[str, ...]
+    """The personas that learned together."""
+
+    kind, verb, unit = "conditioning", "derive", "policies"
+
+    @property
+    def name(self) -> str:
+        return strategy_name(self.strategy)
+
+    @property
+    def strategy(self) -> PersonaNonEgo:
+        return PersonaNonEgo(persona=self.persona)
+
+    @property
+    def drivers(self) -> tuple[PlannedDriver, ...]:
+        return (self.of,)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -260,7 +289,7 @@ class PreventabilityStage(_Stage):
         return (self.of.id, *super().needs)
 
 
-Stage = TrainingStage | AssessmentStage | SearchStage | SelectionStage | PreventabilityStage
+Stage = TrainingStage | ConditioningStage | AssessmentStage | SearchStage | SelectionStage | PreventabilityStage
 
 
 def plays_with_errors(stage: Stage) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import PurePath
@@ -21,14 +21,16 @@ from harness.campaign.plan.planned_drivers import (
     members_of,
     persona_of,
 )
-from harness.campaign.plan.stages import AssessmentStage, Gate, TrainingStage, stage_id
+from harness.campaign.plan.stages import AssessmentStage, ConditioningStage, Gate, TrainingStage, stage_id
 from harness.config.campaign import LEARNED, SUMO, Campaign
 from harness.config.training import ATTENTIVE_SHARE, Training
 from harness.config.traits import PAYOFF, UNREAD, PersonTraits
 from harness.evaluation.strategies import (
+    PAPER_ROUNDS,
     Arm,
     Borrowed,
     EgoStrategy,
+    ManyPersonas,
     NaiveEgo,
     NonEgoStrategy,
     OtherEgo,
@@ -37,6 +39,7 @@ from harness.evaluation.strategies import (
     RetrainedEgo,
     RobustEgo,
     RoundAnswer,
+    Strategy,
     SumoNonEgo,
     player_of,
     strategy_name,
@@ -47,6 +50,11 @@ from harness.game.roles import NON_EGO
 def ego_learns(campaign: Campaign) -> bool:
     """Whether the campaign's ego is a learned policy, trained in it or before."""
     return campaign.ego.driver == LEARNED
+
+
+def has_round_2(campaign: Campaign) -> bool:
+    """Whether an ego that learns is retrained against each persona alone."""
+    return campaign.rounds.count >= PAPER_ROUNDS
 
 
 def crossplay_name(written: str) -> str:
@@ -64,7 +72,7 @@ class SeedStages:
     campaign: Campaign
     seed: int
     traits: PersonTraits = UNREAD
-    gates: dict[EgoStrategy | NonEgoStrategy, tuple[Gate, ...]] = field(default_factory=dict)
+    gates: dict[Strategy, tuple[Gate, ...]] = field(default_factory=dict)
     """Of the strategies after round 2: the gates before their stages."""
 
     def side(self, strategy: EgoStrategy | NonEgoStrategy | None) -> Side:
@@ -97,9 +105,13 @@ class SeedStages:
         )
 
     def training(
-        self, strategy: EgoStrategy | PersonaNonEgo | RoundAnswer, opponent: Side, *, persona: str = ""
+        self,
+        strategy: EgoStrategy | PersonaNonEgo | ManyPersonas | RoundAnswer,
+        opponent: Side,
+        *,
+        persona: str = "",
     ) -> TrainingStage:
-        """The training of a person, or of an ego after the naive one."""
+        """The training of a person, of several in one, or of an ego after the naive one."""
         campaign, is_person = self.campaign, player_of(strategy) == NON_EGO
         warm = campaign.retraining.warm_start and not is_person
         is_of_round_2 = isinstance(strategy, RetrainedEgo | RobustEgo)  # a later ego is a `RoundAnswer`
@@ -115,6 +127,19 @@ class SeedStages:
             gates=self.gates.get(strategy, ()),
             best_known=self._learned(NaiveEgo()) if by_regret else None,
         )
+
+    def people(self, personas: Sequence[str]) -> Iterator[TrainingStage | ConditioningStage]:
+        """The trainings of round 1: one for each persona, or one for all together."""
+        naive = self.side(NaiveEgo())
+        if not self.campaign.non_ego_training.together or len(personas) < 2:
+            for name in personas:
+                yield self.training(PersonaNonEgo(persona=name), naive, persona=name)
+            return
+        of_all = self.training(ManyPersonas(personas=tuple(personas)), naive)
+        yield of_all
+        of = Trained(stage=of_all.id)
+        for name in personas:
+            yield ConditioningStage(seed=self.seed, persona=name, of=of, together=of_all.personas)
 
     def _driver(self, strategy: EgoStrategy | NonEgoStrategy) -> PlannedMember:
         match strategy:
@@ -146,13 +171,14 @@ class SeedStages:
 def training_settings(campaign: Campaign, stage: TrainingStage) -> Training:
     """The settings of one training, with its budget.
 
-    A best response has a budget of its own. A training that meets one of several personas in each game has the budget,
-    and the segment length by which its learning curve is judged, times their number.
+    A best response has a budget of its own. A training in which each game has one of several personas, as the opponent
+    or as the learner, has the budget, and the segment length by which its learning curve is judged, times their number.
     """
     settings = campaign.training
     if stage.is_best_response:
         assert campaign.best_response is not None
         return settings.model_copy(update={"steps": campaign.best_response.steps})
-    personas = max((len({persona_of(each) for each in members_of(driver)}) for driver in stage.opponent), default=1)
+    met = max((len({persona_of(each) for each in members_of(driver)}) for driver in stage.opponent), default=1)
+    personas = met * len(stage.personas)
     more = {"steps": settings.steps * personas, "segment_steps": settings.segment_steps * personas}
     return settings.model_copy(update=more)

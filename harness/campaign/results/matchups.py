@@ -46,7 +46,7 @@ def matchups_of(
     None for a campaign that plays the paper's rounds and nothing more.
     """
     extras = (campaign.crossplay, campaign.best_response, campaign.retraining.against or None)
-    if all(each is None for each in extras) and campaign.rounds.count == PAPER_ROUNDS:
+    if all(each is None for each in extras) and campaign.rounds.count <= PAPER_ROUNDS:
         return None
     stages = plan(campaign, personas, tunable)
     arms = [each for each in stages if isinstance(each, AssessmentStage) and each.id in done]

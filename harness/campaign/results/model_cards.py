@@ -41,9 +41,10 @@ def write_model_cards(
     summary: pd.DataFrame,
     realism: pd.DataFrame,
 ) -> None:
-    """Write the card of every policy of `policies`, the policy.json of each training or selection. `summary` and
-    `realism` are the run's tables of these names."""
-    cards = {stage: model_card(stage, manifest, summary, realism, policy) for stage, policy in policies.items()}
+    """Write the card of every policy of `policies`, the policy.json of each stage that made one. A policy of several
+    personas has none: each of them has one. `summary` and `realism` are the run's tables of these names."""
+    of_one = {stage: policy for stage, policy in policies.items() if "personas" not in policy}
+    cards = {stage: model_card(stage, manifest, summary, realism, policy) for stage, policy in of_one.items()}
     for stage, card in cards.items():
         write_atomically(folder.policy(stage) / CARD, card.encode())
 
@@ -97,6 +98,9 @@ def _facts(
     if policy.get("selected"):
         yield "the same policy as", f"`{policy['selected']}`, chosen by a selection (`selections.csv`)"
     yield "persona", f"`{persona.name}`"
+    if policy.get("learned_in"):
+        personas = ", ".join(f"`{each}`" for each in policy["learned_with"])
+        yield "learned in", f"`{policy['learned_in']}`, one network of {personas}"
     yield "scene", f"`{policy['scene']}`"
     if roads := policy.get("roads"):
         yield "and in equal parts on the roads", ", ".join(f"`{each}`" for each in roads)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import pandas as pd
 from pydantic import ConfigDict, Field, ValidationError
@@ -32,6 +32,8 @@ class _PolicyCard(Document):
     against: str | None = Field(max_length=1000)
     selected: str | None = Field(None, max_length=1000)
     began_from: str | None = Field(max_length=1000)
+    learned_in: str | None = Field(None, max_length=1000)
+    learned_with: list[Annotated[str, Field(max_length=100)]] = Field([], max_length=50)
     training: dict[str, bool | int | float | str | list[int] | None]
 
 
@@ -45,7 +47,7 @@ class ReadRun:
     """All that are planned."""
     scene: OpenScene
     policies: Mapping[str, Mapping[str, Any]]
-    """The policy.json of each policy that was trained or selected, by its stage."""
+    """The policy.json of each policy that was trained, derived or selected, by its stage."""
     episodes: pd.DataFrame
     causes: pd.DataFrame
     manoeuvres: pd.DataFrame
@@ -75,7 +77,7 @@ def read_run(folder: RunFolder, console: Console) -> ReadRun:
     training = joined("training", _gathered(folder, manifest, "training", "training.csv"))
     searches = joined("reconfiguration", _gathered(folder, manifest, "reconfiguration", "reconfiguration.csv"))
     selections = joined("selections", _gathered(folder, manifest, "selection", SELECTED))
-    made = [*_done(manifest, "training"), *_done(manifest, "selection")]
+    made = [stage for kind in ("training", "conditioning", "selection") for stage in _done(manifest, kind)]
     policies = {stage: _policy(folder.policy(stage)) for stage in made}
     judged, courses = (list(_gathered(folder, manifest, "preventability", table)) for table in (JUDGED, TAKEN_OVER))
     with doing(console, "measuring the games"):

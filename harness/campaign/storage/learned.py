@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from harness.campaign.plan.alone_bounds import bound_of
-from harness.campaign.plan.stages import Stage, TrainingStage, stage_id
+from harness.campaign.plan.stages import ConditioningStage, Stage, TrainingStage, stage_id
 from harness.config.campaign import Campaign
 from harness.evaluation.competence import DID_NOT_LEARN, Goals
 
@@ -34,7 +34,7 @@ def judged(
     """
     found = {name: dict(entry) for name, entry in entries.items()}
     for stage in stages:
-        if not isinstance(stage, TrainingStage) or found.get(stage.id, {}).get("status") != "done":
+        if not isinstance(stage, TrainingStage | ConditioningStage) or found.get(stage.id, {}).get("status") != "done":
             continue
         bound = bound_of(campaign, stage)
         alone = goals.get(stage_id(bound.arm, stage.seed)) if bound is not None else None
