@@ -62,7 +62,7 @@ def first_policy(
         steps=1024, learning_rate=NO_LEARNING, demonstration_steps=demonstration_steps, final_deviation=0.5
     )
     spec = naive_ego(scene)
-    other = mixture_of(SumoDriver(), spec.persona)
+    other = mixture_of(SumoDriver(), spec.personas[0])
     return in_one_go(beside(spec, learner, other, settings=chosen, alone_share=alone_share), folder).policy
 
 

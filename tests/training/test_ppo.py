@@ -137,7 +137,7 @@ def test_train__a_policy_trained_with_an_opponent_observes_it(
     alone: TrainingSpec, trained: TrainingResult, tmp_path: Path
 ) -> None:
     ego = LearnedDriver(trained.policy, sampled=False)
-    spec = beside(alone, NON_EGO, mixture_of(ego, alone.persona), alone_share=0.25, settings=settings(steps=1024))
+    spec = beside(alone, NON_EGO, mixture_of(ego, alone.personas[0]), alone_share=0.25, settings=settings(steps=1024))
     with_opponent = in_one_go(spec, tmp_path)
     assert np.abs(with_opponent.policy.tensors["actor.0.weight"][:, OTHERS]).max() > 0.0
 
@@ -176,7 +176,7 @@ def test_train__alone_share_is_the_share_of_games_without_opponent(
 
     monkeypatch.setattr(harness.environments.vector_env.Arena, "reset", recording)
     short_games = alone.settings.model_copy(update={"initial_deviation": 0.5})  # most of them end at the rail
-    spec = beside(alone, EGO, mixture_of(SumoDriver(), alone.persona), alone_share=share, settings=short_games)
+    spec = beside(alone, EGO, mixture_of(SumoDriver(), alone.personas[0]), alone_share=share, settings=short_games)
     progress = in_one_go(spec, tmp_path).progress
     assert len(present) > 60
     tolerance = 0.15 if 0.0 < share < 1.0 else 0.0
@@ -219,7 +219,7 @@ def test_train__the_learner_glances_over_the_shoulder_and_the_opponent_does_not(
     sampled = samplings(monkeypatch)
     speedy = read_document(SPEEDY, Persona)
     assert speedy.human_factors.sight.no_shoulder_glance_share == 0.85  # of a person; the ego is a machine
-    in_one_go(beside(alone, learner, mixture_of(Steady(), speedy), persona=speedy), tmp_path)
+    in_one_go(beside(alone, learner, mixture_of(Steady(), speedy), personas=(speedy,)), tmp_path)
     shares = [[each.sight.no_shoulder_glance_share for (each,) in starts.human_factors] for starts in sampled]
     assert shares
     assert all(each[learner] == 0.0 and each[1 - learner] == opponents_share for each in shares)

@@ -1,0 +1,71 @@
+"""The plan of a campaign whose personas learn together, and of one whose ego is retrained against several alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from harness.campaign.plan.paper_rounds import questions
+from harness.campaign.plan.plan import plan
+from harness.campaign.plan.stages import AssessmentStage, ConditioningStage, TrainingStage
+from harness.campaign.plan.strategy_stages import training_settings
+from harness.config.traits import PersonTraits
+from tests.support.plans import campaign_of, stages_of
+
+PERSONAS = ("anna", "bert", "cleo")
+ASKED: dict[str, Any] = {
+    "non_ego_training": {"together": True},
+    "retraining": {"against": ["anna", "bert"]},
+    "rounds": {"count": 1},
+}
+
+
+def test_plan__of_all_personas_three_trainings_are_left() -> None:
+    stages = plan(campaign_of(*PERSONAS, **ASKED), PERSONAS)
+    trainings = [each for each in stages if isinstance(each, TrainingStage)]
+    assert [each.id for each in trainings] == ["naive-seed1", "people-seed1", "robust-seed1"]
+    assert trainings[1].personas == PERSONAS
+    derived = [each for each in stages if isinstance(each, ConditioningStage)]
+    assert {each.id: each.needs for each in derived} == {f"{name}-seed1": ("people-seed1",) for name in PERSONAS}
+    of_robust = {each.name for each in stages if isinstance(each, AssessmentStage) and "robust" in each.name}
+    assert of_robust == {"robust_alone", *(f"robust_vs_{name}" for name in PERSONAS)}
+
+
+def test_plan__the_budget_of_a_training_together_is_that_of_as_many_trainings() -> None:
+    campaign = campaign_of(*PERSONAS, **ASKED)
+    steps = {
+        each.id: training_settings(campaign, each).steps
+        for each in plan(campaign, PERSONAS)
+        if isinstance(each, TrainingStage)
+    }
+    one = campaign.training.steps
+    assert steps == {"naive-seed1": one, "people-seed1": 3 * one, "robust-seed1": 2 * one}
+
+
+def test_plan__the_arms_are_those_of_personas_that_learn_alone() -> None:
+    arms = []
+    for together in (False, True):
+        stages = stages_of(*PERSONAS, **{**ASKED, "non_ego_training": {"together": together}})
+        arms.append({name: each.sides for name, each in stages.items() if isinstance(each, AssessmentStage)})
+    assert arms[0] == arms[1]
+
+
+def test_plan__the_baseline_of_an_attribution_learns_with_the_others() -> None:
+    campaign = campaign_of("anna", non_ego_training={"together": True}, attribution={"baseline": "cleo"})
+    stages = plan(campaign, ["anna"], traits=PersonTraits(baseline="cleo", differing={"anna": ("payoff",)}))
+    assert [each.personas for each in stages if isinstance(each, TrainingStage) and each.name == "people"] == [
+        ("anna", "cleo")
+    ]
+
+
+def test_plan__one_persona_learns_alone() -> None:
+    stages = plan(campaign_of("anna", non_ego_training={"together": True}), ["anna"])
+    assert [each.name for each in stages if isinstance(each, TrainingStage)] == ["naive", "anna", "retrained_anna"]
+
+
+def test_questions__without_an_ego_of_one_persona_the_second_is_about_the_robust_one() -> None:
+    asked = questions(campaign_of(*PERSONAS, **ASKED), PERSONAS)
+    assert [(each.baseline, each.treatment) for each in asked if each.question == "RQ2"] == [
+        (f"naive_vs_{name}", f"robust_vs_{name}") for name in PERSONAS
+    ]
+    without = {**ASKED, "retraining": {}}
+    assert not [each for each in questions(campaign_of(*PERSONAS, **without), PERSONAS) if each.question == "RQ2"]
