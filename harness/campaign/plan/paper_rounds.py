@@ -71,12 +71,12 @@ def plan_paper_rounds(of: SeedStages, personas: Sequence[str]) -> list[Stage]:
 
 
 def plan_robust(of: SeedStages, personas: Sequence[str]) -> list[Stage]:
-    """The ego retrained against several personas at once, and its arms against all personas of the campaign."""
+    """The ego retrained against several personas at once, and its arms against SUMO's driver and all personas."""
     against = of.campaign.retraining.against
     if not against or not ego_learns(of.campaign):
         return []
     stages: list[Stage] = [of.training(RobustEgo(), (of.mixture(dict.fromkeys(against, 1.0)),))]
-    stages.append(of.assessment(Arm(ego=RobustEgo())))
+    stages += [of.assessment(Arm(ego=RobustEgo(), non_ego=other)) for other in (None, SumoNonEgo())]
     return stages + [of.assessment(against_persona(RobustEgo(), name), persona=name) for name in personas]
 
 

@@ -27,7 +27,7 @@ def test_plan__of_all_personas_three_trainings_are_left() -> None:
     derived = [each for each in stages if isinstance(each, ConditioningStage)]
     assert {each.id: each.needs for each in derived} == {f"{name}-seed1": ("people-seed1",) for name in PERSONAS}
     of_robust = {each.name for each in stages if isinstance(each, AssessmentStage) and "robust" in each.name}
-    assert of_robust == {"robust_alone", *(f"robust_vs_{name}" for name in PERSONAS)}
+    assert of_robust == {"robust_alone", "robust_vs_sumo", *(f"robust_vs_{name}" for name in PERSONAS)}
 
 
 def test_plan__the_budget_of_a_training_together_is_that_of_as_many_trainings() -> None:
