@@ -60,7 +60,7 @@ def league(
             names = [each.strip() for each in scenes.split(",")] if scenes is not None else []
             campaigns = open_league(ego, names, folder, episodes=episodes, shield=shield, allow_code=allow_code)
         outcome = play_league(name_of(ego), campaigns, folder, partial(WorkerPool, jobs=jobs or cores()), console)
-        console.print(league_terminal(name_of(ego), outcome.table))
+        console.print(league_terminal(outcome.table))
         print_plain([f"League: {folder / 'league.html'}"], console)
         if as_json:
             print_json({"league": str(folder), **outcome.record})

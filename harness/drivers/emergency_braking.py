@@ -80,10 +80,15 @@ def rss(encounters: Encounters, own_mps: FloatArray, law: Rss) -> tuple[BoolArra
     """A road user ahead is a danger if neither distance to it is safe (definitions 1, 6 and 8). It requires full
     braking. The parameters, and the assumption that the own lane keeping adds no lateral motion, are those of Mattas
     et al. 2022 (Accident Analysis & Prevention 174, 106743).
+
+    A road user that waits where it has to yield is none, up to the lateral margin: where ways cross, the distance is
+    safe if the one without priority stops before the crossing (definition 17, case 1). That of a moving one is judged
+    as on a road, since it may not obey.
     """
     near = encounters.gap_m < rss_gap_m(own_mps, encounters.speed_mps, law)
     beside = encounters.clearance_m < rss_clearance_m(encounters.approach_mps, law)
-    danger = _ahead(encounters) & near & beside
+    waits = (encounters.yielding_mps < law.waiting_mps) & (encounters.clearance_m > law.lateral_margin_m)
+    danger = _ahead(encounters) & near & beside & ~waits
     return danger, np.full(danger.shape, law.full_braking_g * GRAVITY_MPS2)
 
 

@@ -39,6 +39,8 @@ class Encounters(NamedTuple):
     """Time to that place at the other's present speed; inf without one."""
     has_priority: BoolArray
     """Whether the other has priority there."""
+    yielding_mps: FloatArray
+    """Speed of another that has to yield to the own car at a place ahead of it; inf if it has none, or is in it."""
 
 
 class OwnMotion(NamedTuple):
@@ -89,7 +91,8 @@ def _encounters(car: Car, motion: OwnMotion, others: FloatArray) -> Encounters:
     half_length = 0.5 * (length * turned_cos + width * turned_sin)
     half_width = 0.5 * (length * turned_sin + width * turned_cos)
     lengths = half_length + 0.5 * car.length_m
-    meets, arrives_s = priority != 0.0, np.maximum(other_m, 0.0) / np.maximum(np.hypot(forward, across), 0.1)
+    speed = np.hypot(forward, across)
+    meets, arrives_s = priority != 0.0, np.maximum(other_m, 0.0) / np.maximum(speed, 0.1)
     leftwards = across * along_cos - forward * along_sin
     return Encounters(
         seen=seen > 0.5,
@@ -103,6 +106,7 @@ def _encounters(car: Car, motion: OwnMotion, others: FloatArray) -> Encounters:
         own_to_conflict_m=np.where(meets, own_m, np.inf),
         other_to_conflict_s=np.where(meets, arrives_s, np.inf),
         has_priority=priority > 0.5,
+        yielding_mps=np.where((priority < 0.0) & (other_m > 0.0), speed, np.inf),
     )
 
 

@@ -2,10 +2,10 @@
 
 The rule is that of the reference driver of responsibility-sensitive safety (`egos/rss.toml`, `emergency_braking.rss`):
 where neither the longitudinal nor the lateral distance to a road user ahead is safe, the car has to brake
-(Shalev-Shwartz et al. 2017, definitions 1, 6 and 8). The shield then brakes as that driver does, but at once: the
-reaction time and the jerk of that driver are those of a person, and the safe distances have a margin for them. A
-decision that brakes as hard is kept. The wheel is always the driver's own: the rule says nothing about steering, and
-steering may be what avoids the contact.
+(Shalev-Shwartz et al. 2017, definitions 1, 6 and 8), unless the road user waits for it. The shield then brakes as that
+driver does, but at once: the reaction time and the jerk of that driver are those of a person, and the safe distances
+have a margin for them. A decision that brakes as hard is kept. The wheel is always the driver's own: the rule says
+nothing about steering, and steering may be what avoids the contact.
 """
 
 from __future__ import annotations

@@ -157,8 +157,12 @@ FALSIFICATION = (
 
 NOBODY, SUMO_DRIVER = "nobody", "sumo"
 """The column `person` of arms without a persona."""
+LEAGUE_EGO = (
+    Column("ego", TEXT, "The ego of the league."),
+    Column("shield", TEXT, "The rule of the shield around it (docs/shield.md): `rss`. Empty: it has none."),
+)
 LEAGUE_PAIRING = (
-    Column("ego", TEXT, "The ego of the league, or this ego `with shield`."),
+    *LEAGUE_EGO,
     Column("scene", TEXT, "The scene."),
     Column("person", TEXT, "`nobody`, `sumo` (SUMO's driver in the person's seat), or the persona."),
 )
@@ -190,7 +194,7 @@ LEAGUE_MEASURES = (
 )
 LEAGUE_RANKS = (
     Column("rank", COUNT, "1, and the number of egos that fail significantly less often in the same games."),
-    Column("ego", TEXT, "The ego."),
+    *LEAGUE_EGO,
     Column("games", COUNT, "Games that every ego of the table played."),
     Column("games_left_out", COUNT, "Other games of this ego."),
     *rate("failure_rate", "Share of these games in which the ego failed."),

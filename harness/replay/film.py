@@ -1,7 +1,8 @@
 """A replay as a film: SUMO-GUI plays it on a virtual screen, and its pictures become a GIF or an MP4.
 
-The view follows the ego (after it has left, the other player), in real time. Each player has its name beside it, a
-caption says which colour is whose, and the film stays on its last picture for two seconds.
+The view follows the ego (after it has left, the other player), in real time. Players have their names beside them,
+contacts their time, and no text covers another. A caption says which colour is whose, and the film stays on its last
+picture for two seconds.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from PIL import Image
 
 from harness.errors import HarnessError, Problem, UsageError
 from harness.game.arrays import FloatArray
-from harness.replay.pictures import FORMATS, captioned, encode, find_ffmpeg, labels_at
+from harness.replay.pictures import FORMATS, Label, captioned, encode, find_ffmpeg, kept_apart, labels_at
+from harness.replay.scenery import labels_of_contacts
 from harness.replay.sumo_gui import NO_SUMO_GUI, find_sumo_gui, find_xvfb, home_of, screen_problem, virtual_screen
 from harness.replay.vehicles import PLAYER_COLOURS, legend
 from harness.road.xml.xml_file import parse_xml
@@ -80,13 +82,18 @@ def write_film(
     shown = shown_steps(int(trace["step"].max()), step_length_s)
     interval_s = step_length_s * shown.step
     centres, width_m = _centres(trace), _width_m(folder)
+    touches = list(labels_of_contacts(parse_xml(folder / "scene.add.xml")))
     whose = legend(trace, names)
 
     def pictures(plain: Iterator[Image.Image]) -> Iterator[Image.Image]:
         """The pictures with their captions and labels, the last of them several times."""
         for done, (step, picture) in enumerate(zip(shown, plain, strict=True), 1):
-            labels = labels_at(trace[trace["step"] == step], names, centres[step], SIZE_PX[0] / width_m)
-            yield captioned(picture, f"{title}   {step * step_length_s:.1f} s\n{whose}", labels)
+            px_per_m = SIZE_PX[0] / width_m
+            labels = labels_at(trace[trace["step"] == step], names, centres[step], px_per_m)
+            for text, at_m, contact_m in touches:
+                at_px, of_px = ((point - centres[step]) * px_per_m for point in (at_m, contact_m))
+                labels.append(Label(name=text, at_px=(at_px[0], at_px[1]), of_px=(of_px[0], of_px[1])))
+            yield captioned(picture, f"{title}   {step * step_length_s:.1f} s\n{whose}", kept_apart(labels))
             on_progress(done, len(shown))
         yield from [picture] * round(HOLD_S / interval_s)
 
@@ -113,7 +120,7 @@ def _photographed(
     options = ["-c", str(folder / "scene.sumocfg"), "--quit-on-end"]  # also after a failure
     for option, name, left_out in (
         ("--gui-settings-file", "view.xml", r"<(breakpoint|delay) [^>]*>"),  # a halt would wait for the play button
-        ("--additional-files", "scene.add.xml", r'<poi id="title"[^>]*>'),  # the caption of each picture replaces it
+        ("--additional-files", "scene.add.xml", r"<poi [^>]*>"),  # caption and labels of each picture replace texts
     ):
         content = (folder / name).read_text(encoding="utf-8")
         (work / name).write_text(re.sub(left_out, "", content), encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The pictures of a film: the caption and the name of each player on them, and their encoding.
+"""The pictures of a film: the caption, the name of each player and the contacts on them, and their encoding.
 
 A GIF is encoded by Pillow, an MP4 by ffmpeg (on PATH, or that of the package imageio-ffmpeg).
 """
@@ -11,9 +11,10 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
+from typing import TypeAlias
 
 import pandas as pd
 from PIL import Image, ImageDraw, ImageFont
@@ -26,11 +27,12 @@ _CAPTION_PX, _LABEL_PX = 16, 14
 _AWAY_M = 3.5  # of the middle of a label from the middle of its vehicle
 _LEAST_AWAY_PX = 34.0
 _INK, _PAPER, _MARGIN_PX = (20, 20, 20), (255, 255, 255), 3
+Box: TypeAlias = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Label:
-    """A name, the pixels of its middle from the middle of the picture (right, up), and those of its vehicle."""
+    """A name, the pixels of its middle from the middle of the picture (right, up), and those of what it names."""
 
     name: str
     at_px: tuple[float, float]
@@ -55,20 +57,43 @@ def labels_at(frame: pd.DataFrame, names: Mapping[str, str], centre_m: FloatArra
     return labels
 
 
+def kept_apart(labels: Sequence[Label]) -> list[Label]:
+    """The labels, of which none covers another: one that would is moved away from what it names, up or down."""
+    placed: list[Label] = []
+    for label in labels:
+        away_px = 1.0 if label.at_px[1] >= label.of_px[1] else -1.0
+        while any(_overlap(box_px(label), box_px(other)) for other in placed):
+            label = replace(label, at_px=(label.at_px[0], label.at_px[1] + away_px))
+        placed.append(label)
+    return placed
+
+
+def box_px(label: Label) -> Box:
+    """The edges of a label's box from the middle of the picture: left, bottom, right, top."""
+    left, top, right, bottom = _font(_LABEL_PX).getbbox(label.name, anchor="mm")
+    x, y = label.at_px
+    return x + left - _MARGIN_PX, y - bottom - _MARGIN_PX, x + right + _MARGIN_PX, y - top + _MARGIN_PX
+
+
 def captioned(picture: Image.Image, caption: str, labels: Sequence[Label]) -> Image.Image:
+    """The picture with a caption in its corner, and labels on lines that lead to what they name."""
     draw = ImageDraw.Draw(picture)
     draw.text((12, 10), caption, fill=_INK, font=_font(_CAPTION_PX))
     middle = 0.5 * picture.width, 0.5 * picture.height
     for label in labels:
         x, y = middle[0] + label.at_px[0], middle[1] - label.at_px[1]
-        box = draw.textbbox((x, y), label.name, font=_font(_LABEL_PX), anchor="mm")
         # a line up to the label's own edge: its vehicle stays free
         draw.line([(x, y), (x, 0.5 * (y + middle[1] - label.of_px[1]))], fill=_INK, width=1)
-        draw.rectangle(
-            [box[0] - _MARGIN_PX, box[1] - _MARGIN_PX, box[2] + _MARGIN_PX, box[3] + _MARGIN_PX], fill=_PAPER
-        )
-        draw.text((x, y), label.name, fill=_INK, font=_font(_LABEL_PX), anchor="mm")
+    for label in labels:
+        left, bottom, right, top = box_px(label)
+        draw.rectangle([middle[0] + left, middle[1] - top, middle[0] + right, middle[1] - bottom], fill=_PAPER)
+        at = middle[0] + label.at_px[0], middle[1] - label.at_px[1]
+        draw.text(at, label.name, fill=_INK, font=_font(_LABEL_PX), anchor="mm")
     return picture
+
+
+def _overlap(one: Box, other: Box) -> bool:
+    return all(one[axis] < other[axis + 2] and other[axis] < one[axis + 2] for axis in (0, 1))
 
 
 @lru_cache(maxsize=2)

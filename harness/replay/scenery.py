@@ -27,6 +27,7 @@ _AFTER_THE_GAME_S = 3600.0
 _COLOURS = {"cone": "255,110,0", "closed_lane": "200,60,40,120", "debris": "120,90,60", "wall": "90,90,100"}
 _BUILDING_COLOUR, _RAIL_COLOUR, _CONTACT_COLOUR = "150,140,130", "24,26,32", "220,20,20"
 _RING_RADIUS_M = 4.0
+_OF_LABEL = "_label"
 
 
 def scenery(
@@ -49,9 +50,20 @@ def scenery(
         root.append(_shape(f"contact_{number}", ring, _CONTACT_COLOUR, layer=6, width_m=0.24))
         side = -1 if number % 2 else 1  # the labels of two near contacts do not overlap
         away_m = side * 2.0 * _RING_RADIUS_M
-        root.append(_text(f"contact_{number}_label", contact.label, contact.x_m, contact.y_m + away_m))
+        root.append(_text(f"contact_{number}{_OF_LABEL}", contact.label, contact.x_m, contact.y_m + away_m))
     root.append(_text("title", title, view.x_m, view.y_m + 0.4 * view.height_m))
     return root
+
+
+def labels_of_contacts(document: ElementTree.Element) -> Iterator[tuple[str, FloatArray, FloatArray]]:
+    """The text, the place [2] and the contact [2] (m) of each label of a contact in a document of `scenery`."""
+    shapes = {each.get("id"): each.get("shape", "") for each in document.iter("poly")}
+    for each in document.iter("poi"):
+        name = each.get("id", "").removesuffix(_OF_LABEL)
+        if name in shapes:
+            ring = np.array([point.split(",") for point in shapes[name].split()], dtype=float)
+            place = np.array([float(each.get(axis, "nan")) for axis in ("x", "y")])
+            yield each.get("type", ""), place, 0.5 * (ring.min(0) + ring.max(0))
 
 
 def shapes_of(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from harness.evaluation.comparisons.tied_ranks import with_shield
 from harness.evaluation.result_columns import NOBODY, SUMO_DRIVER
 from harness.reports.failure_table import ORDINARY, FailureCell
 from harness.reports.numbers import NO_SPACE, interval, number, percent
@@ -30,12 +31,12 @@ def render_league(ego: str, table: pd.DataFrame, addresses: Sequence[str], faile
     says what could not be played."""
     rows = table.to_dict("records")
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
-    egos = sorted({row["ego"] for row in rows})
+    shields = sorted({row["shield"] for row in rows})
     people = sorted({row["person"] for row in rows} - {NOBODY, SUMO_DRIVER})
     columns = [each for each in (NOBODY, SUMO_DRIVER, *people) if each in {row["person"] for row in rows}]
     cells: dict[tuple[str, str, str], list[FailureCell]] = {}
     for row, address in zip(rows, addresses, strict=True):
-        cells.setdefault((row["scene"], row["ego"], row["person"]), []).append(_cell(row, address))
+        cells.setdefault((row["scene"], row["shield"], row["person"]), []).append(_cell(row, address))
     return (
         environment_of("reports")
         .get_template("league.html.jinja")
@@ -44,20 +45,20 @@ def render_league(ego: str, table: pd.DataFrame, addresses: Sequence[str], faile
             games=int(table["episodes"].sum() - table["errors"].sum()),
             columns=[person_in_words(each) for each in columns],
             lines=[
-                (_scene_of(scene, each, ego), [cells.get((scene, each, person), []) for person in columns])
+                (with_shield(scene, shield), [cells.get((scene, shield, person), []) for person in columns])
                 for scene in scenes
-                for each in egos
+                for shield in shields
             ],
             headings=HEADINGS,
             tones=RISK_TONES,
-            rows=[(address, list(_texts(row, ego))) for row, address in zip(rows, addresses, strict=True)],
+            rows=[(address, list(_texts(row))) for row, address in zip(rows, addresses, strict=True)],
             failed=failed,
             not_answered=dict.fromkeys((row["scene"], row["reason"]) for row in rows if row["reason"]),
         )
     )
 
 
-def league_terminal(ego: str, table: pd.DataFrame) -> Table:
+def league_terminal(table: pd.DataFrame) -> Table:
     """The twelve worst rows for the terminal."""
     from rich.table import Table
 
@@ -66,7 +67,7 @@ def league_terminal(ego: str, table: pd.DataFrame) -> Table:
         shown.add_column(heading, overflow="fold")
     for row in table.head(12).to_dict("records"):
         style = "dim" if row["reason"] else "red" if row["failure_rate"] > _MUCH else None
-        shown.add_row(*list(_texts(row, ego))[:5], style=style)
+        shown.add_row(*list(_texts(row))[:5], style=style)
     return shown
 
 
@@ -79,7 +80,8 @@ def ranks_terminal(ranks: pd.DataFrame) -> Table:
     for row in ranks.to_dict("records"):
         span = interval(row["failure_rate_low"], row["failure_rate_high"])
         rate = f"{percent(row['failure_rate'])} of {row['games']}"
-        shown.add_row(str(row["rank"]), row["ego"], rate, span, row["told_apart"].replace(" + ", ", ") or "nobody")
+        ego, others = with_shield(row["ego"], row["shield"]), row["told_apart"].replace(" + ", ", ")
+        shown.add_row(str(row["rank"]), ego, rate, span, others or "nobody")
     return shown
 
 
@@ -88,7 +90,7 @@ def sentence_of(row: Mapping[Any, Any]) -> str:
     low, high = row["failure_rate_low"], row["failure_rate_high"]
     who = f"against {person_in_words(row['person'])} in {row['scene']}"
     rate = f"{percent(row['failure_rate'])} (95 %: {interval(low, high)})"
-    fails = f"{row['ego']} fails in {_counts(row)} games {who}: {rate}."
+    fails = f"{with_shield(row['ego'], row['shield'])} fails in {_counts(row)} games {who}: {rate}."
     return f"{fails} Not answered: {row['reason']}." if row["reason"] else fails
 
 
@@ -118,13 +120,8 @@ def _counts(row: Mapping[Any, Any]) -> str:
     return f"{_failures(row)} of {row['episodes'] - row['errors']}"
 
 
-def _scene_of(scene: str, played_by: str, ego: str) -> str:
-    """A scene, and what an ego of the league has besides the one that the page is about: its shield."""
-    return scene + played_by.removeprefix(ego)
-
-
-def _texts(row: Mapping[Any, Any], ego: str) -> Iterator[str]:
-    yield _scene_of(row["scene"], row["ego"], ego)
+def _texts(row: Mapping[Any, Any]) -> Iterator[str]:
+    yield with_shield(row["scene"], row["shield"])
     yield person_in_words(row["person"])
     yield f"{percent(row['failure_rate'])} ({_counts(row)})"
     yield interval(row["failure_rate_low"], row["failure_rate_high"])

@@ -41,7 +41,7 @@ from harness.sumo.insertion import (
 from harness.sumo.loaded_sumo import LoadedSumo
 from harness.sumo.road_signals import Signals, SpeedLimits
 from harness.sumo.scene_games import SceneGames
-from harness.sumo.simulation import NO_SIGNALS, TURN_SIGNALS, AtReset, Reading, Simulation, Tiles
+from harness.sumo.simulation import NO_SIGNALS, TURN_SIGNALS, AtReset, Reading, Simulation
 
 # Options of moveToXY: keepRoute, and the distance within which SUMO looks for a lane. keepRoute's bit 2 places the car
 # exactly, on the road or off it. Its bit 1 limits the search to lanes of the car's route.
@@ -70,15 +70,16 @@ class LibsumoSimulation(Simulation):
         """
         sumo = LoadedSumo(parts, seed)
         try:
-            return [cls(games, sumo, tiles) for games, tiles in zip(parts, sumo.tiles, strict=True)]
+            return [cls(games, sumo, number) for number, games in enumerate(parts)]
         except SimulationError:
             sumo.close()
             raise
 
-    def __init__(self, games: SceneGames, sumo: LoadedSumo, tiles: Tiles) -> None:
+    def __init__(self, games: SceneGames, sumo: LoadedSumo, number: int) -> None:
+        """The games are the part of SUMO with this number."""
         self._scene, self._games, self._taken_over = games.scene, games.games, games.taken_over
         self._recorded, self._alone = games.recorded, games.alone
-        self._sumo, self._tiles = sumo, tiles
+        self._sumo, self._number, self._tiles = sumo, number, sumo.tiles[number]
         self._move_options = _ON_ITS_ROUTE if self._alone else _ON_ANY_LANE
         self._half_length = 0.5 * games.scene.world.length_m
         self._begin()
@@ -160,7 +161,7 @@ class LibsumoSimulation(Simulation):
         with self._sumo.calls("step"):
             targets = (_ANY_EDGE, _ANY_LANE, front_x, front_y, angle, *map(repeat, self._move_options))
             deque(map(_libsumo.vehicle_moveToXY, self._placed, *targets), maxlen=0)  # faster than a loop
-        self._sumo.placed += 1
+        self._sumo.placed.add(self._number)
 
     def step(self) -> Reading:
         with self._sumo.calls("step"):

@@ -47,7 +47,9 @@ class LoadedSumo:
             )
             for own, scene, types in zip(tiles, scenes, names, strict=True)
         ]
-        self.steps = self.loads = self.placed = 0
+        self.steps = self.loads = 0
+        self.placed: set[int] = set()
+        """The parts that have placed their players since the last step, by their number."""
         net = tiled_net([tile for own in tiles for tile in own])
         route_files = ",".join(map(str, files))
         self._options = ["--net-file", str(net), "--route-files", route_files, *parts[0].options]
@@ -74,11 +76,11 @@ class LoadedSumo:
 
     def step(self) -> None:
         """Raises SimulationError if a simulation has not placed its players."""
-        if self.placed < len(self.tiles):
-            raise SimulationError(f"{self.placed} of {len(self.tiles)} simulations have placed their players")
+        if len(self.placed) < len(self.tiles):
+            raise SimulationError(f"{len(self.placed)} of {len(self.tiles)} simulations have placed their players")
         _libsumo.simulation_step()
         self.steps += 1
-        self.placed = 0
+        self.placed.clear()
 
     def close(self) -> None:
         self._release()
@@ -86,7 +88,8 @@ class LoadedSumo:
     def _load(self, options: list[str], load: Callable[[list[str]], object]) -> None:
         with self.calls(f"load scene {self._scenes}"):
             load(options)
-        self.steps = self.placed = 0
+        self.steps = 0
+        self.placed.clear()
         self.loads += 1
 
 

@@ -25,21 +25,25 @@ def league(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_rows__of_both_egos_meet_the_same_people(league: Path) -> None:
     table = read_csv(league / "league.csv")
-    assert {ego: set(rows["person"]) for ego, rows in table.groupby("ego")} == {
-        "adas": PEOPLE,
-        "adas with shield": PEOPLE,
+    assert set(table["ego"]) == {"adas"}
+    assert {shield: set(rows["person"]) for shield, rows in table.groupby("shield")} == {"": PEOPLE, "rss": PEOPLE}
+    assert set(table["arm"][table["shield"] == "rss"]) == {
+        f"shielded_{arm}" for arm in table["arm"][table["shield"] == ""]
     }
     page = (league / "league.html").read_text(encoding="utf-8")
-    assert page.count('<th scope="row">paper_merge with shield</th>') == 1
-    assert 'name="nobody, seed 11 with shield"' in (league / "junit.xml").read_text(encoding="utf-8")
+    assert page.count('<th scope="row">paper_merge with shield rss</th>') == 1
+    junit = (league / "junit.xml").read_text(encoding="utf-8")
+    assert 'name="nobody, seed 11 with shield rss"' in junit
+    assert "adas with shield rss fails in" in junit
 
 
-def test_table__has_both_egos(league: Path) -> None:
-    """One league is enough for a table where it has two egos."""
+def test_table__has_the_ego_with_and_without_its_shield(league: Path) -> None:
+    """One league is enough for a table where it has a shield."""
     done = CliRunner().invoke(app, ["league-table", str(league.parent)])
     assert done.exit_code == 0, done.output
     ranks = read_csv(league.parent / "league_ranks.csv")
-    assert set(ranks["ego"]) == {"adas", "adas with shield"}
+    assert ranks["ego"].tolist() == ["adas", "adas"]
+    assert set(ranks["shield"]) == {"", "rss"}
     assert set(ranks["games"]) == {3 * len(PEOPLE)}
 
 

@@ -24,7 +24,7 @@ from harness.game.arrays import BoolArray, FloatArray
 KMH = 1.0 / 3.6
 LENGTH_M, WIDTH_M, LANE_M = 4.3, 1.9, 3.5  # of the cars and the lanes in the programme
 STEP_S = 0.1
-NO_CONFLICT = (np.inf, np.inf, False)  # the other's way does not cross the own path
+NO_CONFLICT = (np.inf, np.inf, False, np.inf)  # the other's way does not cross the own path
 
 React = Callable[[Encounters, FloatArray, FloatArray, FloatArray], tuple[BoolArray, FloatArray]]
 
@@ -55,6 +55,21 @@ def test_rss__clearance_is_the_published_formula() -> None:
     assert emergency_braking.rss_clearance_m(np.array(1.0), Rss()) == pytest.approx(2.8625)
     # 0.3 + 0.28125 + 0.28125, also for a car that moves away
     np.testing.assert_allclose(emergency_braking.rss_clearance_m(np.array([0.0, -2.0]), Rss()), 0.8625)
+
+
+def test_rss__a_road_user_that_waits_to_yield_is_no_danger() -> None:
+    """10 m ahead at 13 m/s, 0.8 m beside, neither distance is safe: 0.5 (13 + 15.25) 0.75 + 15.25^2 / 12 = 29.97 m, and
+    0.8625 m."""
+    own = np.array([[13.0]])
+
+    def danger(yielding_mps: float, clearance_m: float = 0.8) -> bool:
+        of_other = encounter(10.0, WIDTH_M + clearance_m)._replace(yielding_mps=np.array([[yielding_mps]]))
+        return bool(emergency_braking.rss(of_other, own, Rss())[0][0, 0])
+
+    assert danger(np.inf), "it need not yield"
+    assert not danger(0.0)
+    assert danger(0.2), "it moves"
+    assert danger(0.0, clearance_m=0.29), "within the margin of 0.3 m"
 
 
 def test_proactive__is_the_published_formula() -> None:

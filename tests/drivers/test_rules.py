@@ -134,6 +134,23 @@ def test_perceive__a_crossing_car_with_priority(car: Car) -> None:
     assert encounters.own_to_conflict_m[0] == pytest.approx([18.0, np.inf, np.inf, np.inf])
     assert encounters.other_to_conflict_s[0] == pytest.approx([2.5, np.inf, np.inf, np.inf])
     assert encounters.has_priority.tolist() == [[True, False, False, False]]
+    assert encounters.yielding_mps[0] == pytest.approx([np.inf] * 4), "it need not yield"
+
+
+@pytest.mark.parametrize(
+    ("other", "yielding_mps"),
+    [
+        ({}, 12.0),
+        ({"left_mps": 0.0}, 0.0),
+        ({"other_to_conflict_m": 0.0}, np.inf),  # it is there
+        ({"has_priority": 0.0}, np.inf),  # their ways do not meet
+    ],
+)
+def test_perceive__the_speed_of_a_car_that_has_to_yield(car: Car, other: dict[str, float], yielding_mps: float) -> None:
+    crossing = {"left_mps": 12.0, "ahead_mps": -10.0, "turned_sin": 1.0, "has_priority": -1.0}
+    crossing |= {"ahead_m": 20.0, "left_m": -30.0, "own_to_conflict_m": 18.0, "other_to_conflict_m": 30.0}
+    _, encounters = perceive(car, seeing(10.0, **(crossing | other)))
+    assert encounters.yielding_mps[0] == pytest.approx([yielding_mps, np.inf, np.inf, np.inf])
 
 
 # --- cruising ------------------------------------------------------------------------------------------------------
@@ -190,7 +207,7 @@ def motion(
 def _cruise(gap_m: float, own_mps: float, other_mps: float, before_mps2: float | None = None) -> float:
     """The request of the cruise control behind a car; without `before_mps2` the jerk has no limit."""
     columns = (gap_m + 4.6, gap_m, 0.0, -1.8, other_mps, 0.0, 4.6, np.inf, np.inf)
-    encounters = Encounters(*(np.array([[value]]) for value in (True, *columns, False)))
+    encounters = Encounters(*(np.array([[value]]) for value in (True, *columns, False, np.inf)))
     step_s, before = (1000.0, 0.0) if before_mps2 is None else (0.1, before_mps2)
     view = motion(own_mps, 13.89)
     return float(cruise_mps2(view, encounters, before_mps2=np.array([before]), law=Cruise(), step_s=step_s)[0])

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -10,7 +13,7 @@ from harness.environments.arena import Arena, Seat
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.bicycle import GRAVITY_MPS2, requests
 from harness.game.roles import EGO
-from harness.road.scene.open_scene import OpenScene
+from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.rollouts import Steady
 from tests.support.scenes import placed
 
@@ -76,6 +79,24 @@ def test_shield__keeps_a_decision_that_brakes_as_hard(merge: OpenScene) -> None:
     shield.reset(ONE)
     assert shield.decide(ONE, seen_at(10.0, merge), NOISE).tobytes() == driver.actions.tobytes()
     assert not shield.intervenes.any()
+
+
+@pytest.mark.parametrize(("speed_mps", "brakes"), [(0.0, False), (0.2, True)])
+def test_shield__passes_a_car_that_waits_to_turn_across(repository: Path, speed_mps: float, brakes: bool) -> None:
+    """The ego is 5.3 m from it at 5 m/s, and 0.82 m beside it: neither (5 + 7.25) / 2 * 0.75 + 7.25^2 / 12 = 8.97 m nor
+    0.8625 m is kept."""
+    scene = open_scene(repository / "networks" / "left_across")
+    arena = Arena(scene, 1, [Seat(Steady()), Seat(Steady())])
+    try:
+        turned = math.radians(-172.6)
+        arena.reset({0: placed(scene, (195.6, 98.4, 0.0, 5.0), (205.6, 101.3, turned, speed_mps))})
+        seen = arena.observation[:, EGO].astype(float)
+    finally:
+        arena.close()
+    shield = ShieldedDriver(Pressing(0.5), scene.world)
+    shield.reset(ONE)
+    shield.decide(ONE, seen, NOISE)
+    assert shield.intervenes.tolist() == [brakes]
 
 
 def test_shield__changes_only_the_games_in_danger(merge: OpenScene) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,9 @@ from PIL import Image
 from harness.errors import HarnessError
 from harness.replay import write_film
 from harness.replay.film import SIZE_PX, WIDTH_M, film_problems, shown_steps
-from harness.replay.pictures import encode, labels_at
+from harness.replay.pictures import Label, box_px, encode, kept_apart, labels_at
+from harness.replay.scenery import labels_of_contacts
+from harness.road.xml.xml_file import parse_xml
 from tests.support.pictures import blue, orange, require_gui
 from tests.support.replays import STEP_S, clean_game, collision_game, drive, game, straight, write
 
@@ -105,6 +108,29 @@ def test_labels__two_cars_side_by_side_keep_theirs_apart() -> None:
     ego, speedy = labels_at(frame, {"non_ego": "very_speedy"}, np.array([10.0, 0.0]), 12.0)
     assert (ego.name, ego.of_px, ego.at_px) == ("ego", (0.0, 0.0), (0.0, -42.0))
     assert (speedy.name, speedy.of_px, speedy.at_px) == ("very speedy", (24.0, 36.0), (24.0, 78.0))
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_labels__one_that_would_be_covered_moves_away_from_what_it_names(side: float) -> None:
+    ego = Label(name="ego", at_px=(0.0, side * 90.0), of_px=(0.0, side * 50.0))
+    collision = Label(name="collision at 3.2 s", at_px=(20.0, side * 96.0), of_px=(20.0, 0.0))
+    far = Label(name="speedy", at_px=(200.0, side * 96.0), of_px=(200.0, 0.0))
+    kept = kept_apart([ego, collision, far])
+    assert (kept[0], kept[2]) == (ego, far)
+    assert kept[1] == replace(collision, at_px=(20.0, kept[1].at_px[1]))
+    low, high = sorted((box_px(kept[0]), box_px(kept[1])), key=lambda box: side * box[1])
+    between_px = high[1] - low[3] if side > 0.0 else low[1] - high[3]
+    assert high == box_px(kept[1])
+    assert 0.0 <= between_px < 1.0
+
+
+def test_labels_of_contacts__have_the_place_and_the_contact(merge_net: Path, tmp_path: Path) -> None:
+    folder = write(collision_game(), merge_net, tmp_path / "replay")
+    [(text, at_m, contact_m)] = labels_of_contacts(parse_xml(folder / "scene.add.xml"))
+    assert text == "collision at 3.2 s"
+    assert at_m - contact_m == pytest.approx([0.0, 8.0], abs=0.02)
+    crash = collision_game().query("step == 32")[["x_m", "y_m"]].mean()
+    assert contact_m == pytest.approx(crash.to_numpy(), abs=2.0)
 
 
 # --- what is missing ---

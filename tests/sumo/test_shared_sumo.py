@@ -124,6 +124,19 @@ def test_step__before_all_have_placed_their_players_is_an_error(
         shared[0].step()
 
 
+def test_place__twice_by_one_simulation_does_not_count_for_another(
+    scene: OpenScene, other: OpenScene, shared: list[LibsumoSimulation]
+) -> None:
+    step_with_van(shared, scene, other)
+    for _ in range(2):
+        shared[0].place(*FAR_OFF)
+    with pytest.raises(SimulationError, match="1 of 2 simulations have placed their players"):
+        shared[0].step()
+    shared[1].place(*FAR_OFF)
+    shared[0].step()
+    assert libsumo.simulation.getTime() == pytest.approx(0.2)
+
+
 def test_reload__loads_sumo_once_for_all(
     scene: OpenScene, other: OpenScene, shared: list[LibsumoSimulation], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 
 import pandas as pd
 
 from harness.campaign.plan.stages import AssessmentStage
-from harness.campaign.results.league_rows import ego_in, person_in
+from harness.campaign.results.league_rows import person_in, shield_in
 from harness.campaign.storage.manifest import planned
 from harness.campaign.storage.run_folder import MANIFEST, RunFolder
-from harness.config.campaign import Assessment
+from harness.config.campaign import Assessment, Campaign
 from harness.errors import UsageError
-from harness.evaluation.comparisons.tied_ranks import GAME, league_ranks
+from harness.evaluation.comparisons.tied_ranks import GAME, PLAYER, league_ranks
 from harness.evaluation.tables import read_csv, write_csv
 from harness.reports.provenance import scene_of
 
@@ -29,7 +28,7 @@ def rank_leagues(folder: Path) -> tuple[pd.DataFrame, Path]:
     """
     leagues = sorted(file.parent for file in folder.glob(f"*/{LEAGUE}"))
     games = pd.concat([_games_of(league) for league in leagues], ignore_index=True) if leagues else None
-    if games is None or games["ego"].nunique() < 2:
+    if games is None or len(games[PLAYER].drop_duplicates()) < 2:
         found = ", ".join(each.name for each in leagues) or "none"
         raise UsageError.of(folder, "", f"has fewer than two egos: {found}", "play some: harness league --ego EGO")
     table = league_ranks(games, SIGNIFICANCE)
@@ -43,16 +42,19 @@ def rank_leagues(folder: Path) -> tuple[pd.DataFrame, Path]:
 def _games_of(league: Path) -> pd.DataFrame:
     """The games of the scenes of a league, as `league_ranks` reads them: each game alone or beside SUMO's driver once,
     though it is played for people of every training seed."""
-    ego = min(read_csv(league / LEAGUE)["ego"].unique(), key=len)  # with its shield it has a longer name
+    ego = read_csv(league / LEAGUE)["ego"].iloc[0]
     found = []
     for file in sorted(league.glob(f"*/{MANIFEST}")):
         run = RunFolder(file.parent)
         episodes = read_csv(run.path / "episodes.csv")
         played = episodes[(episodes["error"] == "") & episodes["ego_failed"].notna()]
         manifest = run.manifest()
+        campaign = Campaign.model_validate(manifest["campaign"], strict=False)
         arms = {stage.name: stage.arm for stage in planned(manifest) if isinstance(stage, AssessmentStage)}
-        people, egos = ({name: of(arm) for name, arm in arms.items()} for of in (person_in, partial(ego_in, ego=ego)))
-        named = played.assign(scene=scene_of(manifest), person=played["arm"].map(people), ego=played["arm"].map(egos))
+        people = {name: person_in(arm) for name, arm in arms.items()}
+        shields = {name: shield_in(arm, campaign) for name, arm in arms.items()}
+        named = played.assign(scene=scene_of(manifest), person=played["arm"].map(people), ego=ego)
+        named["shield"] = played["arm"].map(shields)
         found.append(named.assign(seed=named["seed"].where(named["persona"] != "", 0)))
     games = pd.concat(found, ignore_index=True)
-    return games.drop_duplicates([*GAME, "ego"])[[*GAME, "ego", "ego_failed"]]
+    return games.drop_duplicates([*GAME, *PLAYER])[[*GAME, *PLAYER, "ego_failed"]]

@@ -53,9 +53,9 @@ def person_in(arm: Arm) -> str:
             return strategy_name(arm.non_ego)
 
 
-def ego_in(arm: Arm, ego: str) -> str:
-    """What a league calls the ego of an arm: its name, and whether it has its shield."""
-    return f"{ego} with shield" if isinstance(arm.ego, ShieldedEgo) else ego
+def shield_in(arm: Arm, campaign: Campaign) -> str:
+    """The rule of the shield of an arm's ego; empty: it has none."""
+    return (campaign.ego.shield or "") if isinstance(arm.ego, ShieldedEgo) else ""
 
 
 def _each_once(rows: Sequence[Mapping[str, Any]]) -> Iterator[Mapping[str, Any]]:
@@ -63,7 +63,7 @@ def _each_once(rows: Sequence[Mapping[str, Any]]) -> Iterator[Mapping[str, Any]]
     same games."""
     seen = set[tuple[str, str, str]]()
     for row in rows:
-        pairing = (row["scene"], row["person"], row["ego"])
+        pairing = (row["scene"], row["person"], row["shield"])
         if row["person"] not in (NOBODY, SUMO_DRIVER) or pairing not in seen:
             yield row
         seen.add(pairing)
@@ -90,7 +90,7 @@ def _rows(ego: str, run: RunFolder, games: dict[tuple[str, str, int], str]) -> I
         brakes = manoeuvres[(manoeuvres["arm"] == arm) & (manoeuvres["seed"] == seed)]
         hard = brakes[(brakes["player"] == "ego") & (brakes["manoeuvre"] == "hard_brake")]["episode"].nunique()
         cells = {name: row[name] for name in _COPIED} | {"scene": scene, "person": person}
-        cells["ego"] = ego_in(arms[arm], ego)
+        cells |= {"ego": ego, "shield": shield_in(arms[arm], campaign)}
         cells |= {"serious_injuries": played["mais3_risk_high"].sum() / len(played) if len(played) else np.nan}
         cells |= rate_cells("hard_brake_rate", hard, len(played))
         cells["reason"] = "" if person == NOBODY else gate(alone_bounds(campaign, arms[arm]), seed, games_of)["reason"]

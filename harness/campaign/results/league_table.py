@@ -22,6 +22,7 @@ from harness.campaign.results.league_rows import league_rows
 from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.versions import versions
 from harness.errors import FAILED
+from harness.evaluation.comparisons.tied_ranks import with_shield
 from harness.evaluation.tables import table_of, write_csv
 from harness.files import write_atomically
 from harness.reports.junit import case_of, write_junit
@@ -49,7 +50,7 @@ def write_league(ego: str, folder: Path, results: Mapping[str, RunResult]) -> Le
     runs = [RunFolder(folder / name) for name in results]
     rows, games = league_rows(ego, [run for run in runs if (run.path / "summary.csv").is_file()])
     table = table_of("league", rows).sort_values(
-        ["reason", "failure_rate", "serious_injuries", "scene", "person", "seed", "ego"],
+        ["reason", "failure_rate", "serious_injuries", "scene", "person", "seed", "shield"],
         ascending=[True, False, False, True, True, True, True],
         key=lambda column: column != "" if column.name == "reason" else column,
         kind="stable",
@@ -88,7 +89,7 @@ def _write_junit(ego: str, file: Path, table: pd.DataFrame, results: Mapping[str
     cases = []
     for row in table.to_dict("records"):
         error = f"{row['errors']} of {row['episodes']} games could not be played" if row["errors"] else ""
-        name = f"{row['person']}, seed {row['seed']}" + row["ego"].removeprefix(ego)
+        name = with_shield(f"{row['person']}, seed {row['seed']}", row["shield"])
         group = f"league.{row['scene']}"
         cases.append(case_of(name, group, error=error, details=sentence_of(row)))
     for name, result in results.items():

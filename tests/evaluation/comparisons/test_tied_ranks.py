@@ -12,13 +12,10 @@ from harness.evaluation.comparisons.tied_ranks import league_ranks
 SIGNIFICANCE = 0.01
 
 
-def games(ego: str, failed: Sequence[int], first: int = 0) -> pd.DataFrame:
+def games(ego: str, failed: Sequence[int], first: int = 0, shield: str = "") -> pd.DataFrame:
     """Games of an ego in one scene, from this episode on: 1 where it fails."""
-    rows = [
-        {"scene": "merge", "person": "speedy", "seed": 1, "episode": first + k, "ego": ego, "ego_failed": each}
-        for k, each in enumerate(failed)
-    ]
-    return pd.DataFrame(rows)
+    played = {"scene": "merge", "person": "speedy", "seed": 1, "ego": ego, "shield": shield}
+    return pd.DataFrame([{**played, "episode": first + k, "ego_failed": each} for k, each in enumerate(failed)])
 
 
 def ranks(*each: pd.DataFrame) -> dict[str, int]:
@@ -42,6 +39,16 @@ def test_rank__between_two_that_differ_an_ego_may_be_told_apart_from_neither() -
     table = league_ranks(pd.concat([games("g", good), games("m", middle), games("b", bad)]), SIGNIFICANCE)
     assert dict(zip(table["ego"], table["rank"].tolist(), strict=True)) == {"g": 1, "m": 1, "b": 2}
     assert dict(zip(table["ego"], table["told_apart"], strict=True)) == {"g": "b", "m": "", "b": "g"}
+
+
+def test_rank__an_ego_with_its_shield_is_another_one() -> None:
+    """A name says nothing about a shield, whatever words it has."""
+    of_both = [games("a with shield", [1] * 20), games("a with shield", [0] * 20, shield="rss")]
+    table = league_ranks(pd.concat(of_both, ignore_index=True), SIGNIFICANCE)
+    assert table["ego"].tolist() == ["a with shield"] * 2
+    assert table["shield"].tolist() == ["rss", ""]
+    assert table["rank"].tolist() == [1, 2]
+    assert table["told_apart"].tolist() == ["a with shield", "a with shield with shield rss"]
 
 
 def test_ranks__only_games_count_that_every_ego_played() -> None:
