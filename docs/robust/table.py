@@ -24,7 +24,8 @@ Run = Annotated[Path, typer.Argument(metavar="RUN", help="The folder of a run.")
 
 def games_of(run: Path) -> pd.DataFrame:
     """The rows of `episodes.csv` that could be played."""
-    episodes = pd.read_csv(run / "episodes.csv", low_memory=False)
+    plain, packed = run / "episodes.csv", run / "episodes.csv.gz"
+    episodes = pd.read_csv(plain if plain.is_file() else packed, low_memory=False)
     return episodes[episodes["ego_outcome"] != "error"].astype({"ego_failed": bool})
 
 

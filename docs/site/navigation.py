@@ -66,6 +66,7 @@ SECTIONS = {
         "results",
         "personas-on-the-merge",
         "game-on-the-merge",
+        "robust",
         "reproduction",
         "reproduction-assumptions",
         "realism",

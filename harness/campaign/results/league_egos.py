@@ -26,7 +26,7 @@ def rank_leagues(folder: Path) -> tuple[pd.DataFrame, Path]:
 
     Raises UsageError if the leagues of the folder have fewer than two egos, or if no game was played by all egos.
     """
-    leagues = sorted(file.parent for file in folder.glob(f"*/{LEAGUE}"))
+    leagues = sorted(file.parent for file in folder.glob(f"*/{LEAGUE}") if not read_csv(file).empty)
     games = pd.concat([_games_of(league) for league in leagues], ignore_index=True) if leagues else None
     if games is None or len(games[PLAYER].drop_duplicates()) < 2:
         found = ", ".join(each.name for each in leagues) or "none"
