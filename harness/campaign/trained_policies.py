@@ -11,13 +11,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
-from harness.campaign.plan.stages import Stage
+from harness.campaign.plan.stages import ConditioningStage, Stage
 from harness.config.campaign import Campaign
 from harness.config.persona import Persona
 from harness.config.toml_reading import nearest
 from harness.drivers.car import Car, car_of
 from harness.drivers.external import ExternalDriver, find_driver
 from harness.drivers.policy_file import Policy, check_no_archive, persona_hash, policy_files, read_policy
+from harness.drivers.policy_of_many import personas_in, read_policy_of_many
 from harness.drivers.policy_origin import other_games
 from harness.errors import Problem, UsageError, collect
 from harness.game.roles import EGO, NON_EGO, ROLES
@@ -68,6 +69,10 @@ def check_policies(
     problems: list[Problem] = []
     files: list[Path] = []
     drivers: dict[str, ExternalDriver] = {}
+    of_many: dict[str, list[str]] = {}
+    for stage in stages:
+        if isinstance(stage, ConditioningStage):
+            of_many.setdefault(stage.of.stage, []).append(stage.persona)
     for name in dict.fromkeys(name for stage in stages for name in stage.reads):
         place = folder / name / DRIVER
         person = by_name.get(name.rpartition("-seed")[0])
@@ -83,7 +88,11 @@ def check_policies(
                 drivers[name] = driver
                 files += [place, *map(Path, driver.files)]
         else:
-            policy = collect(problems, partial(read_policy, folder / name))
+            is_of_many = name in of_many
+            player = NON_EGO if is_of_many else player
+            policy = collect(problems, partial(read_policy_of_many if is_of_many else read_policy, folder / name))
+            if policy is not None and is_of_many:
+                problems += _problems_of_many(policy, folder / name, of_many[name], by_name)
             if policy is not None:
                 problems += _problems_of(policy, folder / name, ego_persona, by_name)
                 origin = partial(other_games, folder / name, scene.document, scene.world, player=player)
@@ -116,6 +125,18 @@ def _problems_of(
     if persona is not None and card.get("persona_sha256") != persona_hash(persona):
         message = f"was learned by {name!r} with another payoff or limits than the campaign's {persona.name!r} has"
         yield Problem(str(folder), "persona_sha256", message, "train it again, or use the persona it was trained with")
+
+
+def _problems_of_many(
+    policy: Policy, folder: Path, names: Iterable[str], personas: Mapping[str, Persona]
+) -> Iterable[Problem]:
+    hashes = personas_in(dict(policy.card))
+    for name in names:
+        if name not in hashes:
+            yield Problem(str(folder), "personas", f"is no policy of {name!r}", nearest(name, list(hashes)))
+        elif hashes[name] != persona_hash(personas[name]):
+            message = f"was learned by {name!r} with another payoff or limits than the campaign's {name!r} has"
+            yield Problem(str(folder), "personas", message, "train it again, or use the persona it was trained with")
 
 
 def _alternatives(missing: str, available: Iterable[str]) -> str:

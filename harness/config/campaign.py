@@ -303,6 +303,8 @@ class Campaign(Document):
     def _unused_tables(self) -> list[str]:
         """The training tables of the document that nothing uses in a campaign with `policies`."""
         given = [name for name in TRAINING_TABLES if name in self.model_fields_set]
+        if self.non_ego_training.model_fields_set <= {"together"} and "non_ego_training" in given:
+            given.remove("non_ego_training")  # it says which policies are read
         if self.retraining.model_fields_set <= {"against"} and "retraining" in given:
             given.remove("retraining")  # `against` names the arms of the robust ego, which exist without training too
         if self.best_response is None:
@@ -336,7 +338,9 @@ class Campaign(Document):
         unused["naive_training"] = True
         unused["retraining"] = {*Retraining.model_fields} - {"against"} if self.retraining.against else True
         if self.best_response is None:
-            unused |= {"training": True, "non_ego_training": True}
+            together = self.non_ego_training.together
+            unused |= {"training": True}
+            unused["non_ego_training"] = {*NonEgoTraining.model_fields} - {"together"} if together else True
         return self.model_dump(mode="json", exclude=unused)
 
 

@@ -96,7 +96,7 @@ class NonEgoTraining(Document):
     together: bool = False
     """All personas learn in one training for each seed, one of them in each game, in equal shares: one network, which
     has the persona as a further input, and the budget of one training. Of each persona, the policy with this input
-    fixed is written. Left out: a training for each persona."""
+    fixed is written. With `policies`, the network is read from there. Left out: a training for each persona."""
 
 
 class Retraining(Document):

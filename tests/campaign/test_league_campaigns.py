@@ -9,9 +9,14 @@ from pathlib import Path
 import pytest
 
 from harness.campaign import league_campaigns
-from harness.campaign.league_campaigns import name_of, open_league, people_of
+from harness.campaign.league_campaigns import People, name_of, open_league, people_of
+from harness.config.persona import Persona
+from harness.config.toml_reading import read_document
+from harness.drivers.policy_file import Policy, write_policy
+from harness.drivers.policy_of_many import card_of_many
 from harness.errors import UsageError
 from harness.shipped_documents import shipped
+from tests.support.policies import some_policy
 
 
 def drivers(ego: str, folder: Path, allow_code: bool = False) -> list[str]:
@@ -36,17 +41,34 @@ def test_ego__of_each_kind_that_can_be_seen(tmp_path: Path) -> None:
 
 def test_people__are_discovered_by_their_seeds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A new person of other seeds has a campaign of its own; egos in the folder are no people."""
-    assert people_of(shipped("networks").resolve() / "paper_merge") == {(11,): ["paper_distracted", "paper_speedy"]}
-    assert people_of(tmp_path / "paper_merge") == {}
+    both = People(personas=["paper_distracted", "paper_speedy"], seeds=[11], together=False)
+    assert people_of(shipped("networks").resolve() / "paper_merge") == [both]
+    assert people_of(tmp_path / "paper_merge") == []
     policies = tmp_path / "policies" / "paper_merge"
     shutil.copytree(shipped("policies") / "paper_merge", policies)
     (policies / "paper_speedy-seed11").rename(policies / "paper_speedy-seed12")
     real = shipped
     monkeypatch.setattr(league_campaigns, "shipped", lambda kind: policies.parent if kind == "policies" else real(kind))
     scene = real("networks").resolve() / "paper_merge"
-    assert people_of(scene) == {(11,): ["paper_distracted"], (12,): ["paper_speedy"]}
+    assert [(each.personas, each.seeds) for each in people_of(scene)] == [
+        (["paper_distracted"], [11]),
+        (["paper_speedy"], [12]),
+    ]
     names = [each["name"] for each in league_campaigns._campaigns(scene, "sumo", 2)]
     assert names == ["paper_merge", "paper_merge-seed12"]
+
+
+def test_people__of_a_policy_of_several_are_found_in_its_card(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    policies = tmp_path / "policies" / "paper_merge"
+    personas = [read_document(shipped("personas") / f"{name}.toml", Persona) for name in ("speedy", "texting")]
+    for seed in (3, 4):
+        write_policy(Policy(some_policy().tensors, card_of_many(personas)), policies / f"people-seed{seed}")
+    real = shipped
+    monkeypatch.setattr(league_campaigns, "shipped", lambda kind: policies.parent if kind == "policies" else real(kind))
+    scene = real("networks").resolve() / "paper_merge"
+    assert people_of(scene) == [People(personas=["speedy", "texting"], seeds=[3, 4], together=True)]
+    (campaign,) = league_campaigns._campaigns(scene, {"driver": "sumo"}, 2)
+    assert campaign["non_ego_training"] == {"together": True}
 
 
 def test_mistakes__are_all_told_before_anything_is_played(tmp_path: Path) -> None:

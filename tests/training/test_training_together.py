@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.policy_file import LearnedDriver, Policy, read_policy, write_policy
-from harness.drivers.policy_of_many import as_persona, layout_of_many
+from harness.drivers.policy_of_many import as_persona, card_of_many, read_policy_of_many
 from harness.errors import UsageError
 from harness.game.observation_layout import SIZE
 from harness.game.roles import NON_EGO
 from harness.road.scene.open_scene import OpenScene
 from harness.training.training_games import TrainingSpec, open_games
-from tests.support.tiny import SPEEDY, TEXTING, settings
+from tests.support.tiny import CAREFUL, SPEEDY, TEXTING, settings
 from tests.support.trainings import beside, in_one_go, naive_ego
 
 NAMES = ("speedy", "texting", "careful")
@@ -62,7 +62,7 @@ def test_persona__its_policy_decides_as_the_policy_of_several_told_which(number:
     of_many = _of_many(seed=3)
     told = np.concatenate((np.array(seen, dtype=np.float32), np.eye(3, dtype=np.float32)[number]))
     expected = LearnedDriver(of_many, sampled=False).decide(np.zeros(1, int), told[None], np.zeros((1, 2)))
-    alone = LearnedDriver(as_persona(of_many, number), sampled=False)
+    alone = LearnedDriver(as_persona(of_many, NAMES[number]), sampled=False)
     decided = alone.decide(np.zeros(1, int), told[None, :SIZE], np.zeros((1, 2)))
     np.testing.assert_allclose(decided, expected, atol=1e-5)
 
@@ -72,11 +72,10 @@ def test_persona__the_policy_of_several_is_no_driver(tmp_path: Path) -> None:
     write_policy(of_many, tmp_path / "people-seed1")
     with pytest.raises(UsageError, match=r"several personas.*name that of one of them"):
         read_policy(tmp_path / "people-seed1")
-    again = read_policy(tmp_path / "people-seed1", layout_of_many(NAMES))
-    write_policy(as_persona(again, 1), tmp_path / "texting-seed1")
+    write_policy(as_persona(read_policy_of_many(tmp_path / "people-seed1"), "texting"), tmp_path / "texting-seed1")
     assert read_policy(tmp_path / "texting-seed1").layers("actor")[0][0].shape[1] == SIZE
-    with pytest.raises(UsageError):
-        read_policy(tmp_path / "people-seed1", layout_of_many(NAMES[:2]))
+    with pytest.raises(UsageError, match="is not a policy of several personas"):
+        read_policy_of_many(tmp_path / "texting-seed1")
 
 
 def _of_many(seed: int) -> Policy:
@@ -86,4 +85,4 @@ def _of_many(seed: int) -> Policy:
         for k, (inputs, units) in enumerate(((SIZE + 3, 6), (6, outputs))):
             tensors[f"{part}.{k}.weight"] = generator.normal(0.0, 0.3, (units, inputs)).astype(np.float32)
             tensors[f"{part}.{k}.bias"] = generator.normal(0.0, 0.3, units).astype(np.float32)
-    return Policy(tensors, {"personas": list(NAMES), "observation": list(layout_of_many(NAMES))})
+    return Policy(tensors, card_of_many([read_document(file, Persona) for file in (SPEEDY, TEXTING, CAREFUL)]))

@@ -134,6 +134,8 @@ def _done_line(event: Event) -> str:
     info = event.info
     if "settled" in info:
         return f"skipped  {event.stage}: {info['message']}"
+    if "learned_in" in info:
+        return f"done     {event.stage}: from {info['learned_in']}"
     amount = f"{info['steps']:,} steps, {info['stopped']}" if "steps" in info else ""
     amount = amount or next(f"{info[unit]} {unit}" for unit in ("episodes", "trials") if unit in info)
     amount += f", chosen: {info['chosen']}" if "chosen" in info else ""

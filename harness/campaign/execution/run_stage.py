@@ -85,7 +85,7 @@ def _make(stage: Stage, run: StageRun, scene: OpenScene) -> tuple[dict[str, Any]
         case ConditioningStage():
             from harness.campaign.execution.conditioning_stage import carry_out_conditioning
 
-            return carry_out_conditioning(stage, run)
+            return carry_out_conditioning(stage, run, scene)
         case AssessmentStage():
             from harness.campaign.execution.assessment_stage import carry_out_assessment
 

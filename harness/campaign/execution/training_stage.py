@@ -18,7 +18,7 @@ from harness.campaign.storage.training_curves import CHECKPOINT
 from harness.campaign.storage.versions import versions_since
 from harness.config.persona import Persona
 from harness.drivers.policy_file import persona_hash, policy_files, read_policy, write_policy
-from harness.drivers.policy_of_many import layout_of_many
+from harness.drivers.policy_of_many import card_of_many
 from harness.drivers.policy_origin import origin_card
 from harness.errors import StageFailed
 from harness.evaluation.tables import table_of, write_csv
@@ -103,8 +103,7 @@ def _places_on_roads(stage: TrainingStage, run: StageRun) -> Iterator[LearningPl
 def _persona_card(personas: tuple[Persona, ...]) -> dict[str, Any]:
     if len(personas) == 1:
         return {"persona": personas[0].name, "persona_sha256": persona_hash(personas[0])}
-    names = [each.name for each in personas]
-    return {"personas": names, "observation": list(layout_of_many(names))}
+    return card_of_many(personas)
 
 
 def _policy_card(stage: TrainingStage, spec: TrainingSpec) -> dict[str, Any]:

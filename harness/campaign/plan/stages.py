@@ -164,9 +164,7 @@ class TrainingStage(_Stage):
 class ConditioningStage(_Stage):
     """The policy of one persona, from the policy that several learned together."""
 
-    of: Trained
-    together: tuple[str, ...]
-    """The personas that learned together."""
+    of: Trained | TrainedBefore
 
     kind, verb, unit = "conditioning", "derive", "policies"
 

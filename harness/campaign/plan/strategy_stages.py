@@ -129,17 +129,16 @@ class SeedStages:
         )
 
     def people(self, personas: Sequence[str]) -> Iterator[TrainingStage | ConditioningStage]:
-        """The trainings of round 1: one for each persona, or one for all together."""
-        naive = self.side(NaiveEgo())
-        if not self.campaign.non_ego_training.together or len(personas) < 2:
+        """The trainings of round 1: one for each persona, or one for all together, from which each gets its policy."""
+        naive, together = self.side(NaiveEgo()), self.campaign.non_ego_training.together
+        if not together or (len(personas) < 2 and self.campaign.policies is None):
             for name in personas:
                 yield self.training(PersonaNonEgo(persona=name), naive, persona=name)
             return
-        of_all = self.training(ManyPersonas(personas=tuple(personas)), naive)
-        yield of_all
-        of = Trained(stage=of_all.id)
+        of_all = ManyPersonas(personas=tuple(personas))
+        yield self.training(of_all, naive)
         for name in personas:
-            yield ConditioningStage(seed=self.seed, persona=name, of=of, together=of_all.personas)
+            yield ConditioningStage(seed=self.seed, persona=name, of=self._learned(of_all))
 
     def _driver(self, strategy: EgoStrategy | NonEgoStrategy) -> PlannedMember:
         match strategy:
@@ -161,9 +160,10 @@ class SeedStages:
             case _:
                 return self._learned(strategy)
 
-    def _learned(self, strategy: EgoStrategy | NonEgoStrategy, persona: str = "") -> Trained | TrainedBefore:
+    def _learned(self, strategy: Strategy, persona: str = "") -> Trained | TrainedBefore:
         stage = stage_id(strategy_name(strategy), self.seed)
-        if self.campaign.policies is None:
+        is_derived = self.campaign.non_ego_training.together and isinstance(strategy, PersonaNonEgo)
+        if self.campaign.policies is None or is_derived:
             return Trained(stage=stage, persona=persona)
         return TrainedBefore(stage=stage, persona=persona)
 

@@ -42,8 +42,14 @@ def write_model_cards(
     realism: pd.DataFrame,
 ) -> None:
     """Write the card of every policy of `policies`, the policy.json of each stage that made one. A policy of several
-    personas has none: each of them has one. `summary` and `realism` are the run's tables of these names."""
-    of_one = {stage: policy for stage, policy in policies.items() if "personas" not in policy}
+    personas has none: each of them has one. Nor has one that was learned in another run. `summary` and `realism` are
+    the run's tables of these names."""
+    stages = manifest["stages"]
+    of_one = {
+        stage: policy
+        for stage, policy in policies.items()
+        if "personas" not in policy and stages[policy.get("selected") or stage].get("steps") is not None
+    }
     cards = {stage: model_card(stage, manifest, summary, realism, policy) for stage, policy in of_one.items()}
     for stage, card in cards.items():
         write_atomically(folder.policy(stage) / CARD, card.encode())

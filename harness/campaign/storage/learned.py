@@ -34,7 +34,10 @@ def judged(
     """
     found = {name: dict(entry) for name, entry in entries.items()}
     for stage in stages:
-        if not isinstance(stage, TrainingStage | ConditioningStage) or found.get(stage.id, {}).get("status") != "done":
+        entry = found.get(stage.id, {})
+        if not isinstance(stage, TrainingStage | ConditioningStage) or entry.get("status") != "done":
+            continue
+        if entry.get("steps") is None:  # it was trained in another run
             continue
         bound = bound_of(campaign, stage)
         alone = goals.get(stage_id(bound.arm, stage.seed)) if bound is not None else None

@@ -104,7 +104,7 @@ class Manifest(_Record):
                 problems.append(f"{name!r} is no stage")
             if entry.persona not in people:
                 problems.append(f"stages.{name}.persona: there is no document of persona {entry.persona!r}")
-            if entry.kind in ("training", "conditioning") and entry.status == "done":
+            if entry.kind == "training" and entry.status == "done":
                 unsaid = [key for key in ("steps", "budget_steps", "stopped") if getattr(entry, key) is None]
                 problems += [f"stages.{name}.{key}: is missing" for key in unsaid]
         if problems:

@@ -62,6 +62,15 @@ def test_plan__one_persona_learns_alone() -> None:
     assert [each.name for each in stages if isinstance(each, TrainingStage)] == ["naive", "anna", "retrained_anna"]
 
 
+def test_plan__with_policies_each_persona_gets_its_own_from_the_one_that_is_read() -> None:
+    changes = {"non_ego_training": {"together": True}, "policies": "folder", "ego": {"driver": "sumo"}}
+    stages = {each.id: each for each in plan(campaign_of("anna", **changes), ["anna"])}
+    assert not [each for each in stages.values() if isinstance(each, TrainingStage)]
+    assert stages["anna-seed1"].reads == ("people-seed1",)
+    assert stages["anna-seed1"].needs == ()
+    assert "anna-seed1" in stages["naive_vs_anna-seed1"].needs
+
+
 def test_questions__without_an_ego_of_one_persona_the_second_is_about_the_robust_one() -> None:
     asked = questions(campaign_of(*PERSONAS, **ASKED), PERSONAS)
     assert [(each.baseline, each.treatment) for each in asked if each.question == "RQ2"] == [

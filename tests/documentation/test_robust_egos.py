@@ -12,7 +12,7 @@ import pytest
 
 from tests.support.scripts import script
 
-table = script("robust/table.py")
+table = script("robust/robust_egos.py")
 
 FAILED = {"naive_vs_anna": [1, 2], "robust_vs_anna": [0, 3], "naive_vs_bert": [4, 4], "robust_vs_bert": [1, 0]}
 """Of ten games, by training seed. Anna is met in training."""
