@@ -95,8 +95,9 @@ class NonEgoTraining(Document):
     """Share of games without the ego: people learn to drive on empty roads as well."""
     together: bool = False
     """All personas learn in one training for each seed, one of them in each game, in equal shares: one network, which
-    has the persona as a further input, and the budget of one training. Of each persona, the policy with this input
-    fixed is written. With `policies`, the network is read from there. Left out: a training for each persona."""
+    has the persona as a further input. Its budget is that of a training times the number of personas. Of each persona,
+    the policy with this input fixed is written. With `policies`, the network is read from there. Left out: a training
+    for each persona."""
 
 
 class Retraining(Document):

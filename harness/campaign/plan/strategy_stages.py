@@ -171,13 +171,14 @@ class SeedStages:
 def training_settings(campaign: Campaign, stage: TrainingStage) -> Training:
     """The settings of one training, with its budget.
 
-    A best response has a budget of its own. A training that meets one of several personas in each game has the budget,
-    and the segment length by which its learning curve is judged, times their number.
+    A best response has a budget of its own. A training in which each game has one of several personas, as the opponent
+    or as the learner, has the budget, and the segment length by which its learning curve is judged, times their number.
     """
     settings = campaign.training
     if stage.is_best_response:
         assert campaign.best_response is not None
         return settings.model_copy(update={"steps": campaign.best_response.steps})
-    personas = max((len({persona_of(each) for each in members_of(driver)}) for driver in stage.opponent), default=1)
+    met = max((len({persona_of(each) for each in members_of(driver)}) for driver in stage.opponent), default=1)
+    personas = met * len(stage.personas)
     more = {"steps": settings.steps * personas, "segment_steps": settings.segment_steps * personas}
     return settings.model_copy(update=more)

@@ -30,7 +30,7 @@ def test_plan__of_all_personas_three_trainings_are_left() -> None:
     assert of_robust == {"robust_alone", "robust_vs_sumo", *(f"robust_vs_{name}" for name in PERSONAS)}
 
 
-def test_plan__personas_that_learn_together_share_the_budget_of_one_training() -> None:
+def test_plan__the_budget_of_a_training_together_is_that_of_as_many_trainings() -> None:
     campaign = campaign_of(*PERSONAS, **ASKED)
     steps = {
         each.id: training_settings(campaign, each).steps
@@ -38,7 +38,7 @@ def test_plan__personas_that_learn_together_share_the_budget_of_one_training() -
         if isinstance(each, TrainingStage)
     }
     one = campaign.training.steps
-    assert steps == {"naive-seed1": one, "people-seed1": one, "robust-seed1": 2 * one}
+    assert steps == {"naive-seed1": one, "people-seed1": 3 * one, "robust-seed1": 2 * one}
 
 
 def test_plan__the_arms_are_those_of_personas_that_learn_alone() -> None:
