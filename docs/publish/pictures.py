@@ -33,6 +33,7 @@ SCENES = (
     "cut_in",
     "cut_out",
     "brake",
+    "oncoming_bypass",
     "crossing",
     "zebra",
     "cyclist",

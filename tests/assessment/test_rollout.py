@@ -290,6 +290,14 @@ def test_assess__metrics_that_need_a_steering_angle_are_empty_for_sumo(merge: Op
     assert set(game.trace["steering_rad"]) == {0.0}  # otherwise lane changes would be reported as swerves
 
 
+def test_assess__of_sumo_s_drivers_the_one_behind_a_parked_van_waits_for_the_other() -> None:
+    for game in play(arm(open_scene("oncoming_bypass"), SumoDriver(), SumoDriver())):
+        assert (game.record["ego_outcome"], game.record["non_ego_outcome"]) == ("goal", "goal")
+        courses = trace(game)
+        beside = courses[courses["x_m"].between(195.0, 205.0)].groupby("player")["time_s"]
+        assert beside.max()["ego"] < beside.min()["non_ego"]
+
+
 @pytest.mark.parametrize("scene", ["merge", "red_light", "roundabout", "zebra"])
 def test_log__has_every_quantity_of_the_live_game(scene: str, monkeypatch: pytest.MonkeyPatch) -> None:
     live: list[Step] = []

@@ -282,7 +282,7 @@ def car_at(line: shapely.LineString, place_m: float) -> Box:
     return Box((front.x + rear.x) / 2.0, (front.y + rear.y) / 2.0, heading_rad, 4.6, 1.8)
 
 
-@pytest.mark.parametrize("name", ["left_across", "priority_crossing", "roundabout", "red_light"])
+@pytest.mark.parametrize("name", ["left_across", "priority_crossing", "roundabout", "red_light", "oncoming_bypass"])
 def test_junction__the_ego_has_priority_over_the_person_or_a_signal_decides(name: str) -> None:
     right_of_way = open_scene(REPOSITORY / "networks" / name).world.right_of_way
     conflicts, lines = right_of_way.conflicts, right_of_way.stop_lines
@@ -290,6 +290,6 @@ def test_junction__the_ego_has_priority_over_the_person_or_a_signal_decides(name
     signals = {"left_across", "red_light"}
     assert (Control.SIGNAL in set(lines.control.tolist())) == (name in signals)
     assert bool(right_of_way.signal_links) == (name in signals)
-    if name == "priority_crossing":
+    if name in {"priority_crossing", "oncoming_bypass"}:
         assert not conflicts.yields[conflicts.player == EGO].any()
         assert conflicts.yields[conflicts.player == NON_EGO].any()
