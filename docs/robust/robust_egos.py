@@ -1,7 +1,7 @@
 """The table of docs/robust.md, from the tables of a run of campaigns/merge-robust.toml or one like it.
 
-    python docs/robust/robust_egos.py persons reports/merge-robust       # naive and robust ego against every person
-    python docs/robust/robust_egos.py bounds reports/merge-robust        # what the robust ego must reach, and what it does
+    python docs/robust/robust_egos.py persons reports/merge-robust     # naive and robust ego against every person
+    python docs/robust/robust_egos.py bounds reports/merge-robust      # what the robust ego must reach, and whether
 
 Each command prints a table in Markdown. Rates are over all training seeds, with Clopper-Pearson's 95 % interval; the
 games of the seeds start the same, so the intervals are about these trainings.
