@@ -2,6 +2,7 @@
 
     python docs/robust/robust_egos.py persons reports/merge-robust     # naive and robust ego against every person
     python docs/robust/robust_egos.py bounds reports/merge-robust      # what the robust ego must reach, and whether
+    python docs/robust/robust_egos.py compare reports/merge-robust reports/merge-robust-apart      # one training, or 8
 
 Each command prints a table in Markdown. Rates are over all training seeds, with Clopper-Pearson's 95 % interval; the
 games of the seeds start the same, so the intervals are about these trainings.
@@ -20,6 +21,7 @@ from scipy.stats import binomtest
 HARD_BRAKING_MPS2 = 7.5
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, help=__doc__)
 Run = Annotated[Path, typer.Argument(metavar="RUN", help="The folder of a run.")]
+Apart = Annotated[Path, typer.Argument(metavar="RUN", help="The same with a training for each persona.")]
 
 
 def games_of(run: Path) -> pd.DataFrame:
@@ -83,6 +85,22 @@ def bounds(run: Run) -> None:
     print("| --- | --- | --- |")
     for line in lines:
         print(f"| {' | '.join(line)} |")
+
+
+@app.command()
+def compare(run: Run, apart: Apart) -> None:
+    """Failure rates where all personas learned in one training, and where each learned alone, of the same seeds."""
+    together, alone = games_of(run), games_of(apart)
+    together = together[together["seed"].isin(alone["seed"].unique())]
+    names, _ = personas_of(apart)
+    print("| person | naive ego fails: together | apart | points | robust ego fails: together | apart | points |")
+    print("| --- | ---: | ---: | ---: | ---: | ---: | ---: |")
+    for person in names:
+        cells = []
+        for ego in ("naive", "robust"):
+            shares = [own.loc[own["arm"] == f"{ego}_vs_{person}", "ego_failed"].mean() for own in (together, alone)]
+            cells += [*(f"{share:.1%}" for share in shares), f"{100 * (shares[0] - shares[1]):+.1f}"]
+        print(f"| {' | '.join((person, *cells))} |")
 
 
 def _preventable(run: Path) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -59,3 +60,16 @@ def test_bounds__each_is_that_of_the_worst_person(run: Path, capsys: pytest.Capt
     assert preventable.endswith("| 5.00% from the danger on, 15.00% from the start |")
     assert slower.endswith("| 3.0% |")
     assert hard.endswith("| 30.0% (11.9% to 54.3%) against bert |")
+
+
+def test_compare__of_the_seeds_that_both_have(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    apart = tmp_path / "apart"
+    shutil.copytree(run, apart, ignore=shutil.ignore_patterns("apart"))
+    games = pd.read_csv(apart / "episodes.csv.gz")
+    games = games[games["seed"] == 2]
+    games.loc[games["arm"] == "robust_vs_anna", "ego_failed"] = 0.0
+    games.to_csv(apart / "episodes.csv.gz", index=False)
+    table.compare(run, apart)
+    *_, anna, bert = capsys.readouterr().out.splitlines()
+    assert anna == "| anna | 20.0% | 20.0% | +0.0 | 30.0% | 0.0% | +30.0 |"
+    assert bert == "| bert | 40.0% | 40.0% | +0.0 | 0.0% | 0.0% | +0.0 |"
