@@ -25,12 +25,15 @@ from harness.game.cartesian_view import CartesianRoad, CartesianView, MapLane, M
 from harness.game.observation_layout import SIZE
 from harness.game.roles import EGO
 from harness.road.scene.open_scene import OpenScene, open_scene
+from tests.support.commonroad import require_commonroad
 from tests.support.external_drivers import install
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import CAREFUL, harness
 
 GAMES, SEEN, NOISE = np.array([0, 1]), np.zeros((2, SIZE), dtype=np.float32), np.zeros((2, 2))
-IDM, MPC = (REPOSITORY / "egos" / "examples" / "cartesian" / f"{name}.toml" for name in ("idm", "mpc"))
+EXAMPLES = REPOSITORY / "egos" / "examples" / "cartesian"
+IDM, MPC, COMMONROAD = (EXAMPLES / f"{name}.toml" for name in ("idm", "mpc", "commonroad"))
+SCENES = ("roundabout", "merge", "left_across")
 PROGRAM = """
 import json, sys
 for line in sys.stdin:
@@ -140,8 +143,20 @@ def test_document__of_another_kind_has_no_such_table(tmp_path: Path) -> None:
         find_driver("net.toml", tmp_path / "campaign.toml", "ego.driver", allow_code=False)
 
 
+@pytest.fixture(autouse=True)
+def commonroad_first(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let python3 be that of CommonRoad's planner in tests that have its mark."""
+    if request.node.get_closest_marker("commonroad"):
+        monkeypatch.setenv("PATH", require_commonroad())
+
+
 @pytest.mark.parametrize(
-    ("example", "name"), [(IDM, "roundabout"), (IDM, "merge"), (IDM, "left_across"), (MPC, "roundabout")]
+    ("example", "name"),
+    [
+        *((IDM, name) for name in SCENES),
+        (MPC, "roundabout"),
+        *(pytest.param(COMMONROAD, name, marks=pytest.mark.commonroad) for name in SCENES),
+    ],
 )
 def test_example__reaches_the_goal_alone_in_every_game(example: Path, name: str) -> None:
     scene, careful = open_scene(name), read_document(CAREFUL, Persona)
@@ -151,7 +166,7 @@ def test_example__reaches_the_goal_alone_in_every_game(example: Path, name: str)
     assert [game.played["ego_outcome"] for game in assess(alone, 5)] == ["goal"] * 5
 
 
-@pytest.mark.parametrize("example", [IDM, MPC])
+@pytest.mark.parametrize("example", [IDM, MPC, pytest.param(COMMONROAD, marks=pytest.mark.commonroad)])
 def test_example__conforms_to_the_protocol(example: Path) -> None:
     done = harness("check-driver", example, "--games", 2, "--allow-code")
     assert done.returncode == 0, done.stdout + done.stderr
