@@ -20,6 +20,7 @@ from harness.drivers.external import find_driver
 from harness.drivers.mixture import mixture_of
 from harness.drivers.process import PlanningProcess
 from harness.drivers.protocol import planner_of
+from harness.drivers.sumo import SumoDriver
 from harness.errors import DriverError, UsageError
 from harness.game.cartesian_view import CartesianRoad, CartesianView, MapLane, MapSignal, SeenObject, SeenSignal
 from harness.game.observation_layout import SIZE
@@ -159,11 +160,23 @@ def commonroad_first(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyP
     ],
 )
 def test_example__reaches_the_goal_alone_in_every_game(example: Path, name: str) -> None:
+    assert outcomes(example, name, None, games=5) == ["goal"] * 5
+
+
+@pytest.mark.commonroad
+def test_commonroad__reaches_the_goal_beside_sumos_driver() -> None:
+    """Some of its starts see the other car farther from the route than the path's coordinates go."""
+    assert outcomes(COMMONROAD, "left_across", SumoDriver(), games=3) == ["goal"] * 3
+
+
+def outcomes(example: Path, name: str, other: SumoDriver | None, games: int) -> list[str]:
+    """How games of an example end for it, beside a driver or alone."""
     scene, careful = open_scene(name), read_document(CAREFUL, Persona)
     driver = find_driver(str(example), example, "", allow_code=True).make(car_of(scene.world, EGO), sampled=False)
-    people = [None] * (len(scene.world.roles) - 1)
-    alone = SeatedArm(name="naive_alone", scene=scene, drivers=(mixture_of(driver, careful), *people), seed=1)
-    assert [game.played["ego_outcome"] for game in assess(alone, 5)] == ["goal"] * 5
+    person = other and mixture_of(other, careful)
+    players = (mixture_of(driver, careful), *[person] * (len(scene.world.roles) - 1))
+    arm = SeatedArm(name="naive_vs_sumo" if other else "naive_alone", scene=scene, drivers=players, seed=1)
+    return [game.played["ego_outcome"] for game in assess(arm, games)]
 
 
 @pytest.mark.parametrize("example", [IDM, MPC, pytest.param(COMMONROAD, marks=pytest.mark.commonroad)])

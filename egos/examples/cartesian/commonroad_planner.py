@@ -19,6 +19,7 @@ from commonroad.scenario.obstacle import DynamicObstacle, ObstacleType
 from commonroad.scenario.scenario import Scenario
 from commonroad.scenario.state import InitialState, KSState
 from commonroad.scenario.trajectory import Trajectory
+from commonroad_clcs.pycrccosy import CartesianProjectionDomainError
 from commonroad_dc import pycrcc
 from commonroad_rp.reactive_planner import ReactivePlanner
 from commonroad_rp.state import ReactivePlannerState
@@ -76,7 +77,7 @@ def follows(each, at_m, path, half_lane_m):
     """Whether an object is behind the car in its lane."""
     try:
         station_m, aside_m = path.convert_to_curvilinear_coords(each["x_m"], each["y_m"])
-    except ValueError:  # it is too far from the path
+    except CartesianProjectionDomainError:  # it is too far from the path
         return False
     return station_m < at_m and abs(aside_m) < half_lane_m
 
