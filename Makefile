@@ -14,7 +14,7 @@ export UV_FIND_LINKS ?= $(PIP_FIND_LINKS)
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help install demo campaign quick test test-release test-esmini wheel coverage bench publish docs check lock clean
+.PHONY: help install demo campaign quick test test-release test-esmini test-commonroad wheel coverage bench publish docs check lock clean
 
 help: ## list the targets
 	@echo "make TARGET [ARGS='...'] [PYTHON=python3.x]"
@@ -40,6 +40,9 @@ test-release: install ## run every test: before a release; ARGS names those of w
 
 test-esmini: install ## run the tests with esmini and its maps: make test-esmini ESMINI=/path/to/bin/esmini
 	HARNESS_REQUIRE_ESMINI=1 ESMINI="$(ESMINI)" $(BIN)/pytest -n 0 -m esmini tests/export tests/cli $(ARGS)
+
+test-commonroad: install ## drive by CommonRoad's reactive planner in an environment of its own: COMMONROAD=/path/to/venv
+	HARNESS_REQUIRE_COMMONROAD=1 COMMONROAD="$(COMMONROAD)" $(BIN)/pytest -n 0 -m commonroad tests/drivers $(ARGS)
 
 wheel: install ## test the wheel in an environment of its own, with the locked versions: make wheel PYTHON=python3.13
 	rm -rf build/wheel && $(PYTHON) -m venv build/wheel/venv

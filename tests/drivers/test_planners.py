@@ -20,17 +20,21 @@ from harness.drivers.external import find_driver
 from harness.drivers.mixture import mixture_of
 from harness.drivers.process import PlanningProcess
 from harness.drivers.protocol import planner_of
+from harness.drivers.sumo import SumoDriver
 from harness.errors import DriverError, UsageError
 from harness.game.cartesian_view import CartesianRoad, CartesianView, MapLane, MapSignal, SeenObject, SeenSignal
 from harness.game.observation_layout import SIZE
 from harness.game.roles import EGO
 from harness.road.scene.open_scene import OpenScene, open_scene
+from tests.support.commonroad import require_commonroad
 from tests.support.external_drivers import install
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import CAREFUL, harness
 
 GAMES, SEEN, NOISE = np.array([0, 1]), np.zeros((2, SIZE), dtype=np.float32), np.zeros((2, 2))
-IDM, MPC = (REPOSITORY / "egos" / "examples" / "cartesian" / f"{name}.toml" for name in ("idm", "mpc"))
+EXAMPLES = REPOSITORY / "egos" / "examples" / "cartesian"
+IDM, MPC, COMMONROAD = (EXAMPLES / f"{name}.toml" for name in ("idm", "mpc", "commonroad"))
+SCENES = ("roundabout", "merge", "left_across")
 PROGRAM = """
 import json, sys
 for line in sys.stdin:
@@ -140,20 +144,52 @@ def test_document__of_another_kind_has_no_such_table(tmp_path: Path) -> None:
         find_driver("net.toml", tmp_path / "campaign.toml", "ego.driver", allow_code=False)
 
 
+@pytest.fixture(autouse=True)
+def commonroad_first(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let python3 be that of CommonRoad's planner in tests that have its mark."""
+    if request.node.get_closest_marker("commonroad"):
+        monkeypatch.setenv("PATH", require_commonroad())
+
+
 @pytest.mark.parametrize(
-    ("example", "name"), [(IDM, "roundabout"), (IDM, "merge"), (IDM, "left_across"), (MPC, "roundabout")]
+    ("example", "name"),
+    [
+        *((IDM, name) for name in SCENES),
+        (MPC, "roundabout"),
+        *(pytest.param(COMMONROAD, name, marks=pytest.mark.commonroad) for name in SCENES),
+    ],
 )
 def test_example__reaches_the_goal_alone_in_every_game(example: Path, name: str) -> None:
+    assert outcomes(example, name, None, games=5) == ["goal"] * 5
+
+
+@pytest.mark.commonroad
+def test_commonroad__reaches_the_goal_beside_sumos_driver() -> None:
+    """Some of its starts see the other car farther from the route than the path's coordinates go."""
+    assert outcomes(COMMONROAD, "left_across", SumoDriver(), games=3) == ["goal"] * 3
+
+
+def outcomes(example: Path, name: str, other: SumoDriver | None, games: int) -> list[str]:
+    """How games of an example end for it, beside a driver or alone."""
     scene, careful = open_scene(name), read_document(CAREFUL, Persona)
     driver = find_driver(str(example), example, "", allow_code=True).make(car_of(scene.world, EGO), sampled=False)
-    people = [None] * (len(scene.world.roles) - 1)
-    alone = SeatedArm(name="naive_alone", scene=scene, drivers=(mixture_of(driver, careful), *people), seed=1)
-    assert [game.played["ego_outcome"] for game in assess(alone, 5)] == ["goal"] * 5
+    person = other and mixture_of(other, careful)
+    players = (mixture_of(driver, careful), *[person] * (len(scene.world.roles) - 1))
+    arm = SeatedArm(name="naive_vs_sumo" if other else "naive_alone", scene=scene, drivers=players, seed=1)
+    return [game.played["ego_outcome"] for game in assess(arm, games)]
 
 
-@pytest.mark.parametrize("example", [IDM, MPC])
-def test_example__conforms_to_the_protocol(example: Path) -> None:
-    done = harness("check-driver", example, "--games", 2, "--allow-code")
+@pytest.mark.parametrize(
+    ("example", "name"),
+    [
+        (IDM, "merge"),
+        (MPC, "merge"),
+        pytest.param(COMMONROAD, "paper_merge", marks=pytest.mark.commonroad),  # its games are short
+    ],
+)
+def test_example__conforms_to_the_protocol(example: Path, name: str) -> None:
+    scene = REPOSITORY / "networks" / name
+    done = harness("check-driver", example, "--scene", scene, "--games", 2, "--allow-code")
     assert done.returncode == 0, done.stdout + done.stderr
     assert "2 games at once, one of them reset in between: the same actions as alone" in done.stdout
 

@@ -3,6 +3,7 @@
 import json
 import math
 import sys
+import traceback
 from itertools import pairwise
 
 SPACING_M = 0.5  # of the points of the route's line
@@ -52,5 +53,9 @@ def run(decide):
             road = message["road"]
             speeds = speeds_on(road, hello["parameters"]["comfortable_mps2"])
         elif message["type"] == "decide":
-            answer = {"actions": [decide(view, road, speeds, hello) for view in message["views"]]}
+            try:
+                answer = {"actions": [decide(view, road, speeds, hello) for view in message["views"]]}
+            except Exception as error:
+                traceback.print_exc()
+                answer = {"error": f"{type(error).__name__}: {error}"}
         print(json.dumps(answer), flush=True)
