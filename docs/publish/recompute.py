@@ -41,6 +41,7 @@ class Games:
         episodes = next(path for name in ("episodes.csv", "episodes.csv.gz") if (path := run / name).exists())
         table = pd.read_csv(episodes, low_memory=False)
         self.played = table[(table["ego_outcome"] != "error") & table["error"].isna()]
+        self.names = set(self.played["arm"])
         self.by_arm = {place: rows.set_index("episode") for place, rows in self.played.groupby(["arm", "seed"])}
 
     def of(self, arm: str, seed: int) -> pd.DataFrame:
@@ -101,19 +102,19 @@ def summary(table: pd.DataFrame, games: Games) -> Iterator[Cell]:
             yield f"{where}, ego_payoff", row["ego_payoff"], arm["ego_payoff"].mean()
 
 
-def arms(question: str, persona: str) -> tuple[str, str]:
-    return (
-        ("naive_alone", f"naive_vs_{persona}")
-        if question == "RQ1"
-        else (f"naive_vs_{persona}", f"retrained_vs_{persona}")
-    )
+def arms(question: str, persona: str, games: Games) -> tuple[str, str]:
+    """Of a campaign that retrains no ego against one persona, the second question is about the robust one."""
+    naive, retrained = f"naive_vs_{persona}", f"retrained_vs_{persona}"
+    if question == "RQ1":
+        return "naive_alone", naive
+    return naive, retrained if retrained in games.names else f"robust_vs_{persona}"
 
 
 def comparisons(table: pd.DataFrame, games: Games) -> Iterator[Cell]:
     for row in table.to_dict("records"):
         question, metric = row["question"], row["metric"]
         sign = SIGNS.get((question, metric), 1)
-        values = sign * games.differences(*arms(question, row["persona"]), row["seed"], COLUMNS[metric])
+        values = sign * games.differences(*arms(question, row["persona"], games), row["seed"], COLUMNS[metric])
         where = f"comparisons, {question} {row['persona']}, seed {row['seed']}, {metric}"
         yield f"{where}, pairs", row["pairs"], len(values)
         if len(values):
@@ -145,7 +146,7 @@ def over_trainings(table: pd.DataFrame, games: Games, answered: pd.DataFrame) ->
         asked = answered[(answered["question"] == question) & (answered["persona"] == persona)]
         seeds = asked[(asked["metric"] == "failure") & asked["reason"].isna()]["seed"]
         sign, where = SIGNS[question, "failure"], f"over_trainings, {question} {persona}"
-        columns = [sign * games.differences(*arms(question, persona), seed, "ego_failed") for seed in seeds]
+        columns = [sign * games.differences(*arms(question, persona, games), seed, "ego_failed") for seed in seeds]
         yield f"{where}, trainings", row["trainings"], len(columns)
         if math.isnan(row["mean_difference"]):
             continue

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from harness.evaluation.comparisons.acceptance_checks import Check, worst_of_each
 from harness.reports.numbers import MISSING, NO_SPACE, SURE, number, percent
@@ -30,6 +30,7 @@ class Line:
     """What is limited, and for which persona."""
     sentence: str
     """What was measured, and the bound."""
+    measured: bool = True
 
     @property
     def text(self) -> str:
@@ -45,6 +46,7 @@ def acceptance_lines(checks: Sequence[Check], seeds: int) -> list[Line]:
             passed=check.passed,
             title=f"{TITLES[check.bound]}, {check.persona}{f', seed {check.seed}' if seeds > 1 else ''}",
             sentence=sentence(check),
+            measured=check.measured,
         )
         for check in worst_of_each(checks)
     ]
@@ -64,12 +66,10 @@ def sentence(check: Check) -> str:
 
 def by_sentence(lines: Sequence[Line]) -> list[Line]:
     """The lines, those that say the same in one: its title names them all."""
-    titles: dict[tuple[bool, str], list[str]] = {}
+    alike: dict[tuple[bool, str], list[Line]] = {}
     for line in lines:
-        titles.setdefault((line.passed, line.sentence), []).append(line.title)
-    return [
-        Line(passed=passed, title="; ".join(same), sentence=sentence) for (passed, sentence), same in titles.items()
-    ]
+        alike.setdefault((line.passed, line.sentence), []).append(line)
+    return [replace(same[0], title="; ".join(each.title for each in same)) for same in alike.values()]
 
 
 def headline(checks: Sequence[Check]) -> str:

@@ -29,6 +29,8 @@ from harness.reports.run_tables import RunTables
 from harness.reports.start_section import start_section
 from harness.reports.verdict_wording import planned_in_words
 
+MOST_BROKEN = 3
+"""Broken bounds that the first screen shows; the others are folded, so that the answers stay in sight."""
 MOST_ROWS = 10_000
 """The page leaves out a longer table of games and refers to its CSV file."""
 GAMES_BYTES = 600_000
@@ -75,6 +77,7 @@ def render_page(
         **header(tables),
         **troubles(tables),
         acceptance=_acceptance(tables),
+        most_broken=MOST_BROKEN,
         failure_table=failure_table(tables, links),
         answers=first_answers(tables, steps),
         attribution=attribution_section(tables, links),
@@ -115,11 +118,13 @@ def render_page(
 
 
 def _acceptance(tables: RunTables) -> tuple[bool, str, list[Any]] | None:
-    """Whether every bound is kept, that in words, and a line for each; None without bounds."""
+    """Whether every bound is kept, that in words, and a line for each, those that were measured first; None without
+    bounds."""
     if tables.acceptance is None:
         return None
     lines = acceptance_lines(tables.acceptance, len(tables.seeds))
-    return all(each.passed for each in lines), headline(tables.acceptance), by_sentence(lines)
+    shown = sorted(by_sentence(lines), key=lambda each: not each.measured)
+    return all(each.passed for each in lines), headline(tables.acceptance), shown
 
 
 def _tables(tables: RunTables) -> dict[str, Any]:

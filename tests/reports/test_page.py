@@ -7,6 +7,7 @@ from functools import partial
 import pandas as pd
 import pytest
 
+from harness.evaluation.comparisons.acceptance_checks import Check
 from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.competence import WITHHELD, Verdict
 from harness.evaluation.realism import CRASHES, DECLARED
@@ -24,6 +25,7 @@ from tests.support.pages import (
     blank_figures,
     campaign,
     cannot_drive,
+    plain,
     recomputed,
     recordings,
     rendered,
@@ -445,3 +447,17 @@ def test_causes__each_opens_its_games_shortly_before_it(small):
     html = without_curves(small | recordings(small))
     link = '<a href="#game=naive_vs_speedy,1,6&amp;t=2.5">naive_vs_speedy, game 6</a>'
     assert f"{link}: collision (cuts in from the left, 1.2 s before the end)" in html
+
+
+def test_acceptance__shows_three_broken_bounds_the_measured_ones_first(small):
+    def check(persona, value):
+        limit = value + 0.1
+        numbers = {"value": value, "limit": limit, "allowed": 0.1, "games": 60}
+        return Check(bound="failure_rate", persona=persona, seed=1, arm=f"naive_vs_{persona}", **numbers)
+
+    people = [check("anna", math.nan), *(check(name, 0.1 * k) for k, name in enumerate(("bert", "cleo", "dora"), 3))]
+    text = plain(Page(rendered(**small | {"acceptance": people})).text)
+    places = [text.index(f"failures, {name}") for name in ("bert", "cleo", "dora", "anna")]
+    assert places == sorted(places)
+    assert places[2] < text.index("1 more not kept") < places[3]
+    assert "more not kept" not in Page(rendered(**small | {"acceptance": people[1:]})).text
