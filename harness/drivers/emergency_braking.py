@@ -57,13 +57,24 @@ def careful_and_competent(
 
 
 def rss_gap_m(own_mps: FloatArray, other_mps: FloatArray, law: Rss) -> FloatArray:
-    """[...] safe longitudinal distance (Shalev-Shwartz et al. 2017, definition 1):
+    """[...] safe longitudinal distance (Shalev-Shwartz et al. 2017, definitions 1 and 2). Behind one that drives the
+    same way, at least 0:
 
-    v r + a r^2 / 2 + (v + r a)^2 / (2 b_min) - v_other^2 / (2 b_max), at least 0
+    v r + a r^2 / 2 + (v + r a)^2 / (2 b_min) - v_other^2 / (2 b_max)
+
+    Before one that comes towards the own car (negative `other_mps`) both react and brake alike: the sum of the first
+    three terms of both, with b_min for b_min,correct.
     """
-    after = own_mps + law.reaction_s * law.acceleration_mps2
-    own = 0.5 * (own_mps + after) * law.reaction_s + after**2 / (2.0 * law.braking_mps2)
-    return np.maximum(own - other_mps**2 / (2.0 * law.other_braking_mps2), 0.0)
+    oncoming_mps = np.maximum(-other_mps, 0.0)
+    ahead = np.maximum(_stopping_m(own_mps, law) - other_mps**2 / (2.0 * law.other_braking_mps2), 0.0)
+    towards = _stopping_m(own_mps, law) + _stopping_m(oncoming_mps, law)
+    return np.where(oncoming_mps > law.waiting_mps, towards, ahead)
+
+
+def _stopping_m(speed_mps: FloatArray, law: Rss) -> FloatArray:
+    """[...] way until a car stands that accelerates during the reaction time, and then brakes."""
+    after = speed_mps + law.reaction_s * law.acceleration_mps2
+    return 0.5 * (speed_mps + after) * law.reaction_s + after**2 / (2.0 * law.braking_mps2)
 
 
 def rss_clearance_m(approach_mps: FloatArray, law: Rss) -> FloatArray:
@@ -77,7 +88,7 @@ def rss_clearance_m(approach_mps: FloatArray, law: Rss) -> FloatArray:
 
 
 def rss(encounters: Encounters, own_mps: FloatArray, law: Rss) -> tuple[BoolArray, FloatArray]:
-    """A road user ahead is a danger if neither distance to it is safe (definitions 1, 6 and 8). It requires full
+    """A road user ahead is a danger if neither distance to it is safe (definitions 1, 2, 6 and 8). It requires full
     braking. The parameters, and the assumption that the own lane keeping adds no lateral motion, are those of Mattas
     et al. 2022 (Accident Analysis & Prevention 174, 106743).
 
@@ -98,9 +109,11 @@ def proactive(gap_m: FloatArray, own_mps: FloatArray, other_mps: FloatArray, law
     hardest braking does not.
 
     0 from v r + v^2 / (2 b_comfortable) - v_other^2 / (2 b_other) + 2 margin on;
-    1 up to v r + v^2 / (2 b_hardest) - v_other^2 / (2 b_other) + margin; linear between.
+    1 up to v r + v^2 / (2 b_hardest) - v_other^2 / (2 b_other) + margin; linear between. The way in which the other
+    stops counts negative if it comes towards the own car.
     """
-    common = own_mps * law.reaction_s - other_mps**2 / (2.0 * law.other_braking_mps2) + law.margin_m
+    way_of_other = other_mps * np.abs(other_mps) / (2.0 * law.other_braking_mps2)
+    common = own_mps * law.reaction_s - way_of_other + law.margin_m
     safe = common + own_mps**2 / (2.0 * law.comfortable_mps2) + law.margin_m
     unsafe = common + own_mps**2 / (2.0 * law.hardest_mps2)
     return _share_of(gap_m, safe, unsafe)

@@ -10,6 +10,7 @@ import selectors
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 import weakref
 from collections.abc import Sequence
@@ -38,16 +39,25 @@ class Program:
     """A running program. No read or write on its pipes blocks beyond a deadline."""
 
     def __init__(self, command: Sequence[str], folder: Path) -> None:
+        """Start `command` in `folder`. Its temporary files are removed with it: a program that is killed can't do so."""
+        temporary = tempfile.TemporaryDirectory(prefix="harness-program-", ignore_cleanup_errors=True)
         wrapper = [sys.executable, "-I", "-S", "-c", _DIE_WITH_PARENT, str(os.getpid())]
         prefix = wrapper if sys.platform == "linux" else []
         pipe = subprocess.PIPE
         try:
             self._process = subprocess.Popen(
-                [*prefix, *command], cwd=folder, start_new_session=True, stdin=pipe, stdout=pipe, stderr=pipe
+                [*prefix, *command],
+                cwd=folder,
+                env=os.environ | {"TMPDIR": temporary.name},
+                start_new_session=True,
+                stdin=pipe,
+                stdout=pipe,
+                stderr=pipe,
             )
         except OSError as error:
+            temporary.cleanup()
             raise DriverError(f"{command[0]} can't be started: {error}") from None
-        self._kill = weakref.finalize(self, _kill, self._process)
+        self._kill = weakref.finalize(self, _kill, self._process, temporary)
         self._stdin, self._stdout, self._stderr = _pipes(self._process)
         self._selector = selectors.DefaultSelector()
         for stream in (self._stdin, self._stdout, self._stderr):
@@ -130,8 +140,8 @@ def _pipes(process: subprocess.Popen[bytes]) -> list[IO[bytes]]:
     return [each for each in (process.stdin, process.stdout, process.stderr) if each is not None]
 
 
-def _kill(process: subprocess.Popen[bytes]) -> None:
-    """End a program and its child processes."""
+def _kill(process: subprocess.Popen[bytes], temporary: tempfile.TemporaryDirectory[str]) -> None:
+    """End a program and its child processes, and remove its temporary files."""
     try:
         os.killpg(process.pid, signal.SIGKILL)
     except (ProcessLookupError, PermissionError):
@@ -140,3 +150,4 @@ def _kill(process: subprocess.Popen[bytes]) -> None:
         with suppress(OSError):
             pipe.close()
     process.wait()
+    temporary.cleanup()

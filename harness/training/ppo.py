@@ -16,7 +16,7 @@ import numpy as np
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.logger import configure
+from stable_baselines3.common.logger import Logger, configure
 from stable_baselines3.common.utils import set_random_seed
 
 from harness.drivers.policy_file import Policy
@@ -125,7 +125,7 @@ def _learner(spec: TrainingSpec, environment: JoinedVecEnv, tensorboard: Path | 
         policy_kwargs={"net_arch": list(settings.network), "log_std_init": float(np.log(settings.initial_deviation))},
         device="cpu",
     )
-    model.set_logger(configure(str(tensorboard), ["tensorboard"]) if tensorboard else configure(None, []))
+    model.set_logger(configure(str(tensorboard), ["tensorboard"]) if tensorboard else Logger(None, []))
     if spec.initial is not None:
         put_policy(model, spec.initial, settings.initial_deviation)
         return model

@@ -48,6 +48,11 @@ def test_rss__gap_is_the_published_formula() -> None:
     # other 10 m/s: 100 / 12 = 8.333333
     assert emergency_braking.rss_gap_m(np.array(20.0), np.array(10.0), Rss()) == pytest.approx(48.765625)
     assert emergency_braking.rss_gap_m(np.array(0.0), np.array(30.0), Rss()) == 0.0
+    # one that comes with 10 m/s: after 12.25; 0.5 (10 + 12.25) 0.75 + 12.25^2 / 12 = 20.848958 more than 57.098958
+    assert emergency_braking.rss_gap_m(np.array(20.0), np.array(-10.0), Rss()) == pytest.approx(77.947917)
+    # one that stands, or crosses with 0.05 m/s against the own way, does not come
+    gaps_m = emergency_braking.rss_gap_m(np.full(2, 20.0), np.array([0.0, -0.05]), Rss())
+    np.testing.assert_allclose(gaps_m, 57.098958, atol=1e-3)
 
 
 def test_rss__clearance_is_the_published_formula() -> None:
@@ -79,6 +84,8 @@ def test_proactive__is_the_published_formula() -> None:
     np.testing.assert_allclose(
         emergency_braking.proactive(gaps, own, other, FuzzySafety()), [0.0, 0.25, 1.0, 1.0], atol=1e-6
     )
+    # one that comes with 10 m/s: 69 + 100 / 14 = 76.142857 and 50.333333 + 100 / 14 = 57.476190; half way 66.809524
+    assert emergency_braking.proactive(np.array(66.809524), own, -other, FuzzySafety()) == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize(

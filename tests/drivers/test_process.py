@@ -56,6 +56,15 @@ def test_process__receives_all_messages_and_decides_in_si_units(tmp_path: Path, 
     np.testing.assert_array_equal(decide["noise"], NOISE)
 
 
+def test_process__temporary_files_of_a_program_are_removed_with_it(tmp_path: Path, car: Car) -> None:
+    mine = driver(tmp_path, car, 'import tempfile; open("made", "w").write(tempfile.mkdtemp())')
+    mine.reset(GAMES)
+    made = Path((tmp_path / "made").read_text())
+    assert made.is_dir()
+    mine.close()
+    assert not made.parent.exists()
+
+
 def test_process__scaled_units_are_those_of_policies(tmp_path: Path, car: Car) -> None:
     change = 'if games and message["type"] == "decide": answer["actions"] = [row[:2] for row in message["observation"]]'
     mine = driver(tmp_path, car, change, units="scaled")
