@@ -110,7 +110,7 @@ class Rss(ReferenceReaction):
     other_braking_mps2: float = Field(6.0, ge=1.0, le=12.0)
     """Greatest braking of the leading car."""
     waiting_mps: float = Field(0.1, ge=0.0, le=1.0)
-    """Speed below which a road user that has to yield to the ego waits, and one that faces it does not come towards it."""
+    """Speed below which a road user that has to yield to the ego waits, and an oncoming one counts as standing."""
     lateral_mps2: float = Field(1.0, ge=0.1, le=5.0)
     """Lateral acceleration of other cars, towards the ego and away from it."""
     lateral_margin_m: float = Field(0.3, ge=0.0, le=2.0)

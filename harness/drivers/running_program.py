@@ -39,7 +39,7 @@ class Program:
     """A running program. No read or write on its pipes blocks beyond a deadline."""
 
     def __init__(self, command: Sequence[str], folder: Path) -> None:
-        """Start `command` in `folder`. Its temporary files are removed with it: a program that is killed can't do so."""
+        """Start `command` in `folder`. Its temporary files are removed with it: a killed program can't do so."""
         temporary = tempfile.TemporaryDirectory(prefix="harness-program-", ignore_cleanup_errors=True)
         wrapper = [sys.executable, "-I", "-S", "-c", _DIE_WITH_PARENT, str(os.getpid())]
         prefix = wrapper if sys.platform == "linux" else []
