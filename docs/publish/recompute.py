@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 import sys
+from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -314,7 +315,17 @@ def main(runs: list[Path]) -> int:
     return int(mismatches > 0)
 
 
+def runs_named(arguments: list[str]) -> list[Path]:
+    """The run folders of the command line: all that are published if it names none. Ends the program if one has no
+    games."""
+    parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
+    parser.add_argument("runs", nargs="*", type=Path, metavar="RUN", help="a run folder with its tables")
+    runs: list[Path] = parser.parse_args(arguments).runs
+    for run in runs:
+        if not (run / "summary.csv").is_file() or not list(run.glob("episodes.csv*")):
+            parser.error(f"{run}: has no summary.csv, or no episodes.csv; name a run folder")
+    return runs or sorted(each.parent for each in REPORTS.glob("*/summary.csv"))
+
+
 if __name__ == "__main__":
-    sys.exit(
-        main([Path(each) for each in sys.argv[1:]] or sorted(each.parent for each in REPORTS.glob("*/summary.csv")))
-    )
+    sys.exit(main(runs_named(sys.argv[1:])))

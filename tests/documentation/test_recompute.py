@@ -40,3 +40,11 @@ def test_cell__that_the_games_do_not_give_is_found(
     cells.to_csv(run / f"{table}.csv", index=False)
     assert recompute.main([run]) == 1
     assert f"  {where}: published " in capsys.readouterr().out
+
+
+def test_runs__default_to_all_published_ones_and_must_have_games(capsys: pytest.CaptureFixture[str]) -> None:
+    assert JUNCTION in recompute.runs_named([])
+    with pytest.raises(SystemExit) as ended:
+        recompute.runs_named([str(REPORTS / "nothing")])
+    assert ended.value.code == 2
+    assert "has no summary.csv, or no episodes.csv" in capsys.readouterr().err
