@@ -104,11 +104,13 @@ def summary(table: pd.DataFrame, games: Games) -> Iterator[Cell]:
 
 
 def arms(question: str, persona: str, games: Games) -> tuple[str, str]:
-    """Of a campaign that retrains no ego against one persona, the second question is about the robust one."""
-    naive, retrained = f"naive_vs_{persona}", f"retrained_vs_{persona}"
+    """The two arms of a question. The second question is about the ego that was retrained against this persona, by
+    learning or by a search of parameters, or else about the robust one."""
+    naive = f"naive_vs_{persona}"
     if question == "RQ1":
         return "naive_alone", naive
-    return naive, retrained if retrained in games.names else f"robust_vs_{persona}"
+    answers = [f"{ego}_vs_{persona}" for ego in ("retrained", "reconfigured", "robust")]
+    return naive, next((arm for arm in answers if arm in games.names), answers[0])
 
 
 def comparisons(table: pd.DataFrame, games: Games) -> Iterator[Cell]:

@@ -18,6 +18,7 @@ SECTIONS = {
         "campaigns",
         "commands",
         "league",
+        "baselines",
         "roads",
         "egos",
         "observation",
