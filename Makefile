@@ -14,7 +14,7 @@ export UV_FIND_LINKS ?= $(PIP_FIND_LINKS)
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help install demo campaign quick test test-release test-esmini test-commonroad wheel coverage bench publish docs check lock clean
+.PHONY: help install demo campaign quick test test-release test-esmini test-commonroad test-ros2 wheel coverage bench publish docs check lock clean
 
 help: ## list the targets
 	@echo "make TARGET [ARGS='...'] [PYTHON=python3.x]"
@@ -43,6 +43,9 @@ test-esmini: install ## run the tests with esmini and its maps: make test-esmini
 
 test-commonroad: install ## drive by CommonRoad's reactive planner in an environment of its own: COMMONROAD=/path/to/venv
 	HARNESS_REQUIRE_COMMONROAD=1 COMMONROAD="$(COMMONROAD)" $(BIN)/pytest -n 0 -m commonroad tests/drivers $(ARGS)
+
+test-ros2: install ## drive by a ROS 2 node; ROS2 is an environment with rclpy: make test-ros2 ROS2=/path/to/venv
+	HARNESS_REQUIRE_ROS2=1 ROS2="$(ROS2)" $(BIN)/pytest -n 0 -m ros2 tests/drivers $(ARGS)
 
 wheel: install ## test the wheel in an environment of its own, with the locked versions: make wheel PYTHON=python3.13
 	rm -rf build/wheel && $(PYTHON) -m venv build/wheel/venv

@@ -26,6 +26,7 @@ SECTIONS = {
         "egos-by-networks",
         "egos-by-programs",
         "egos-in-cartesian",
+        "egos-by-ros2",
         "egos-by-fmus",
         "reconfiguration",
         "shield",

@@ -26,14 +26,15 @@ from harness.game.cartesian_view import CartesianRoad, CartesianView, MapLane, M
 from harness.game.observation_layout import SIZE
 from harness.game.roles import EGO
 from harness.road.scene.open_scene import OpenScene, open_scene
-from tests.support.commonroad import require_commonroad
 from tests.support.external_drivers import install
+from tests.support.other_pythons import require_commonroad, require_ros2
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import CAREFUL, harness
 
 GAMES, SEEN, NOISE = np.array([0, 1]), np.zeros((2, SIZE), dtype=np.float32), np.zeros((2, 2))
-EXAMPLES = REPOSITORY / "egos" / "examples" / "cartesian"
-IDM, MPC, COMMONROAD = (EXAMPLES / f"{name}.toml" for name in ("idm", "mpc", "commonroad"))
+EXAMPLES = REPOSITORY / "egos" / "examples"
+IDM, MPC, COMMONROAD = (EXAMPLES / "cartesian" / f"{name}.toml" for name in ("idm", "mpc", "commonroad"))
+ROS2 = EXAMPLES / "ros2" / "ros2.toml"
 SCENES = ("roundabout", "merge", "left_across")
 PROGRAM = """
 import json, sys
@@ -44,12 +45,6 @@ for line in sys.stdin:
     answers = {"hello": {"protocol": 2}, "decide": {"actions": actions}}
     print(json.dumps(answers.get(message["type"], {})), flush=True)
 """
-
-
-@pytest.fixture(scope="session")
-def start(merge: OpenScene) -> CartesianView:
-    """The view at the start of the ego's route on the merge."""
-    return CartesianView.at_start(merge.cartesian_roads[EGO])
 
 
 def planner(folder: Path, car: Car, history_s: float = 0.0) -> PlanningProcess:
@@ -145,10 +140,11 @@ def test_document__of_another_kind_has_no_such_table(tmp_path: Path) -> None:
 
 
 @pytest.fixture(autouse=True)
-def commonroad_first(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let python3 be that of CommonRoad's planner in tests that have its mark."""
-    if request.node.get_closest_marker("commonroad"):
-        monkeypatch.setenv("PATH", require_commonroad())
+def its_python_first(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let python3 be that of CommonRoad's planner, or of ROS 2, in tests that have its mark."""
+    for mark, require in (("commonroad", require_commonroad), ("ros2", require_ros2)):
+        if request.node.get_closest_marker(mark):
+            monkeypatch.setenv("PATH", require())
 
 
 @pytest.mark.parametrize(
@@ -157,6 +153,7 @@ def commonroad_first(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyP
         *((IDM, name) for name in SCENES),
         (MPC, "roundabout"),
         *(pytest.param(COMMONROAD, name, marks=pytest.mark.commonroad) for name in SCENES),
+        *(pytest.param(ROS2, name, marks=pytest.mark.ros2) for name in SCENES),
     ],
 )
 def test_example__reaches_the_goal_alone_in_every_game(example: Path, name: str) -> None:
@@ -167,6 +164,11 @@ def test_example__reaches_the_goal_alone_in_every_game(example: Path, name: str)
 def test_commonroad__reaches_the_goal_beside_sumos_driver() -> None:
     """Some of its starts see the other car farther from the route than the path's coordinates go."""
     assert outcomes(COMMONROAD, "left_across", SumoDriver(), games=3) == ["goal"] * 3
+
+
+@pytest.mark.ros2
+def test_ros2__reaches_the_goal_beside_sumos_driver() -> None:
+    assert outcomes(ROS2, "merge", SumoDriver(), games=5) == ["goal"] * 5
 
 
 def outcomes(example: Path, name: str, other: SumoDriver | None, games: int) -> list[str]:
@@ -185,6 +187,7 @@ def outcomes(example: Path, name: str, other: SumoDriver | None, games: int) -> 
         (IDM, "merge"),
         (MPC, "merge"),
         pytest.param(COMMONROAD, "paper_merge", marks=pytest.mark.commonroad),  # its games are short
+        pytest.param(ROS2, "paper_merge", marks=pytest.mark.ros2),
     ],
 )
 def test_example__conforms_to_the_protocol(example: Path, name: str) -> None:
