@@ -18,7 +18,6 @@ SECTIONS = {
         "campaigns",
         "commands",
         "league",
-        "baselines",
         "roads",
         "egos",
         "observation",
