@@ -31,6 +31,8 @@ from harness.reports.verdict_wording import planned_in_words
 
 MOST_BROKEN = 3
 """Broken bounds that the first screen shows; the others are folded, so that the answers stay in sight."""
+MOST_LINES = 8
+"""Lines of the first table; one of more is denser."""
 MOST_ROWS = 10_000
 """The page leaves out a longer table of games and refers to its CSV file."""
 GAMES_BYTES = 600_000
@@ -78,6 +80,7 @@ def render_page(
         **troubles(tables),
         acceptance=_acceptance(tables),
         most_broken=MOST_BROKEN,
+        most_lines=MOST_LINES,
         failure_table=failure_table(tables, links),
         answers=first_answers(tables, steps),
         attribution=attribution_section(tables, links),
