@@ -3,8 +3,8 @@
     python docs/publish/first_screens.py FOLDER [RUN...]
 
 makes the page of each run in reports/ from its published tables, without recorded games and with blank figures, and
-takes FOLDER/RUN-light.png and FOLDER/RUN-dark.png of 1280 by 800 pixels. It names what of a first screen lies below, and ends with 1 if there is
-any. It needs Chromium and the extra `dev`.
+takes FOLDER/RUN-light.png and FOLDER/RUN-dark.png of 1280 by 800 pixels. It names what of a first screen lies below,
+and ends with 1 if there is any. It needs Chromium and the extra `dev`.
 """
 
 from __future__ import annotations

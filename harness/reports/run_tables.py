@@ -53,7 +53,9 @@ class Change(NamedTuple):
 
 
 RETRAINED = Change("retrained", "retraining", "retraining", lambda persona: RetrainedEgo(against=persona))
-RECONFIGURED = Change("reconfigured", "reconfiguration", "reconfiguration", lambda persona: ReconfiguredEgo(against=persona))
+RECONFIGURED = Change(
+    "reconfigured", "reconfiguration", "reconfiguration", lambda persona: ReconfiguredEgo(against=persona)
+)
 ROBUST = Change("robust", "retraining against several personas", "retraining", lambda persona: RobustEgo())
 
 
