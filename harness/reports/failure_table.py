@@ -34,6 +34,8 @@ NOBODY, WORST_KNOWN = "nobody", "worst known opponent"
 ORDINARY, ORDINARY_PERSON = "SUMO’s driver", "ordinary person"
 """Who has the person's place in the control arm: a driver; or, where people do not drive, a walker or rider."""
 TAKES_OVER = "UN R157’s driver takes over"
+MOST_LINES, MOST_INTERVALS = 8, 24
+"""Lines of the table, and intervals below one another; with more of either it is dense."""
 AXES = (0.05, 0.1, 0.2, 0.4, 0.6, 1.0)
 """The ends that the common axis of failure rates may have."""
 
@@ -83,6 +85,7 @@ def failure_table(tables: RunTables, links: GameLinks) -> dict[str, Any] | None:
         "columns": columns,
         "lines": lines,
         "top": top,
+        "dense": len(lines) > MOST_LINES or len(lines) * len(tables.seeds) > MOST_INTERVALS,
         "tones": {tone: words for tone, words in RISK_TONES.items() if any(cell.tone == tone for cell in cells)},
     }
 

@@ -84,6 +84,12 @@ def test_table__its_axis_ends_above_every_interval():
     assert table_in(run_of(failing=LAWFUL | {"naive": 0.0, "retrained": 0.0}))["top"] == 0.1  # 0 of 60: to 6 %
 
 
+def test_table__of_many_people_or_trainings_is_dense():
+    assert not table_in(run_of(personas=("speedy", "distracted")))["dense"]
+    assert table_in(run_of(personas=[f"person{each}" for each in "abcdefg"]))["dense"]
+    assert table_in(run_of(seeds=range(1, 10)))["dense"]
+
+
 def test_table__warns_of_an_ego_that_fails_where_no_persona_takes_part():
     assert [line.person for line in table_in(run_of())["lines"] if line.warns] == []
     assert [line.person for line in table_in(run_of(failing={"sumo": 0.05}))["lines"] if line.warns] == [

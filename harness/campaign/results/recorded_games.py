@@ -81,6 +81,8 @@ def path_of(trace: pd.DataFrame, scene: OpenScene, game: Any) -> FailingPath:
         persona=game.persona,
         players={role: rows[["x_m", "y_m"]].to_numpy(float) for role, rows in players.items()},
         contact_m=(touches[-1].x_m, touches[-1].y_m) if touches else None,
+        seed=int(game.seed),
+        episode=int(game.episode),
     )
 
 
