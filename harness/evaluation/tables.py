@@ -8,7 +8,9 @@ A table is recognised by its columns.
 from __future__ import annotations
 
 import csv
+import gzip
 import io
+import zlib
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -106,13 +108,14 @@ def exact(value: object) -> str:
 
 
 def read_csv(path: Path) -> pd.DataFrame:
-    """The table `write_csv` wrote, equal to it in every value and dtype (empty text is "", not NaN).
+    """The table `write_csv` wrote, equal to it in every value and dtype (empty text is "", not NaN). Where a file is
+    missing, it is read from the compressed one of the same name and `.gz`: long tables are published so.
 
     Raises UsageError when the file is missing or is not such a table.
     """
     remedy = "run the campaign again: it rewrites its tables"
     try:
-        text = content_of(path, _MOST_BYTES).decode("utf-8")
+        text = _content(path).decode("utf-8")
         reader = csv.reader(io.StringIO(text, newline=""), strict=True)
         header, lines = next(reader, []), list(reader)
         columns = columns_of(header)
@@ -123,8 +126,19 @@ def read_csv(path: Path) -> pd.DataFrame:
         return typed(pd.DataFrame(parsed))
     except OSError as error:
         raise UsageError.of(path, "", f"can't be read: {error.strerror}", remedy) from error
-    except (ValueError, OverflowError, csv.Error) as error:
+    except (ValueError, OverflowError, EOFError, zlib.error, csv.Error) as error:
         raise UsageError.of(path, "", f"is not a table of this harness: {error}", remedy) from error
+
+
+def _content(path: Path) -> bytes:
+    packed = path.with_name(f"{path.name}.gz")
+    if path.exists() or not packed.exists():
+        return content_of(path, _MOST_BYTES)
+    with gzip.GzipFile(fileobj=io.BytesIO(content_of(packed, _MOST_BYTES))) as file:
+        content = file.read(_MOST_BYTES + 1)
+    if len(content) > _MOST_BYTES:
+        raise ValueError(f"it has more than {_MOST_BYTES:,} bytes")
+    return content
 
 
 def _parse(cells: Iterable[str], dtype: str) -> pd.Series:

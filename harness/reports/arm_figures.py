@@ -25,8 +25,9 @@ NOT_PLAYED = "not played"
 QUANTITIES = {
     "ego_mean_speed_mps": "average speed (m/s)",
     "ego_trailing_distance_m": "trailing distance (m)",
-    "ego_min_ttc_s": "least time to collision (s; 20: and more)",
+    "ego_min_ttc_s": "least time to collision (s; 20: more)",
     "ego_max_deceleration_mps2": "hardest braking (m/s²)",
+    "ego_delta_v_mps": "delta-v of collisions (m/s)",
 }
 PAIRED = ("ego_mean_speed_mps", "ego_min_ttc_s")
 LONGEST_TIME_S = 20.0
@@ -121,7 +122,7 @@ def paired_figure(pairs: pd.DataFrame, name: str, alternative: str, made: str) -
 
 def spread_figure(columns: Sequence[ArmColumn], name: str, alternative: str) -> Markup:
     """For each quantity and arm: every game as a dot, the middle half as a box, the median as a line."""
-    with figure_of(13.4, 4.0) as figure:
+    with figure_of(15.4, 4.0) as figure:
         all_axes = figure.subplots(1, len(QUANTITIES), squeeze=False)[0]
         for axes, (quantity, title) in zip(all_axes, QUANTITIES.items(), strict=True):
             labels = []
@@ -139,7 +140,7 @@ def spread_figure(columns: Sequence[ArmColumn], name: str, alternative: str) -> 
                 if len(measured) <= MOST_DOTS:
                     _games(axes, place + _beside(len(values)), column.games, quantity, column.series)
             axes.use_sticky_edges = False
-            axes.set_title(title, fontsize=10, loc="left")
+            axes.set_title(title, fontsize=9, loc="left")
             axes.set_xlim(-0.6, len(columns) - 0.4)
             axes.set_xticks(range(len(labels)), labels, fontsize=8)
             axes.tick_params(axis="x", length=0)

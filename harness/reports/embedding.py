@@ -91,6 +91,10 @@ class GameTracks:
     background: Sequence[Track]
     touches: Sequence[tuple[float, float, float]]
     """Time (s) and place (x, y in m) of each contact."""
+    severity: float = 0.0
+    """The column of episodes.csv, which orders games."""
+    delta_v_mps: float | None = None
+    """Of a collision: the greater change of velocity (m/s); None: there is none, or it is not known."""
     reference: Reference | None = None
     """How a reference driver takes over and prevents the collision; None: none does."""
     perceived: Sequence[tuple[int, Sequence[str], int]] = ()
@@ -159,6 +163,8 @@ def game_text(game: GameTracks, marks: Marks, causes: Causes, crowds: Crowds) ->
             "outcome": game.outcome,
             "cause": causes.get(key(game.arm, game.seed, game.episode), ""),
             "leastTime": round(measured[0], 2) if measured else None,
+            "severity": round(game.severity, 2),
+            "deltaV": None if game.delta_v_mps is None else round(game.delta_v_mps, 1),
             "players": players,
             "background": [_track(vehicle) for vehicle in game.background],
             "reference": None if game.reference is None else _reference(game.reference),

@@ -1,4 +1,5 @@
-"""The paths of the games that an ego fails, over one another on the road, with the places of contact."""
+"""The paths of the games that an ego fails, over one another on the road, with the places of contact; and of the worst
+games by themselves, for paper."""
 
 from __future__ import annotations
 
@@ -11,12 +12,15 @@ import shapely
 from markupsafe import Markup
 
 from harness.game.arrays import FloatArray
+from harness.reports.embedding import key
 from harness.reports.figures import ROAD, figure_of, svg
 
 SPAN_S = 3.0
 """A path is drawn from this time before the end of the game on."""
 MOST_PATHS = 60
 """Of an arm; of more failures the worst are drawn."""
+MOST_ON_PAPER = 3
+"""Games of which the printed page has a picture each."""
 _MARGIN_M = 6.0
 _WIDTH_IN, _LEAST_IN, _MOST_IN = 7.2, 1.3, 4.0
 
@@ -31,6 +35,8 @@ class FailingPath:
     """Centres [n, 2] (m), by role."""
     contact_m: tuple[float, float] | None
     """The last contact of the game; None: there is none."""
+    seed: int = 0
+    episode: int = 0
 
 
 def paths_figures(
@@ -50,6 +56,18 @@ def paths_figures(
             which = some if count > len(drawn) else f"all {count} failures" if count > 1 else "the only failure"
             title = f"The {label}: {which}"
             yield title, _figure(drawn, scene, f"{name}-{place}", f"{title}, seen from above on the road.")
+
+
+def worst_figures(
+    paths: Sequence[FailingPath], scene: Mapping[str, Any], causes: Mapping[str, str], several_seeds: bool
+) -> Iterator[tuple[str, Markup]]:
+    """A picture of each of the worst games, which are the first of `paths`, with its title. `causes` says by
+    `embedding.key` why the ego failed."""
+    for place, path in enumerate(paths[:MOST_ON_PAPER]):
+        seed = f", seed {path.seed}" if several_seeds else ""
+        cause = causes.get(key(path.arm, path.seed, path.episode), "")
+        title = f"{path.arm}{seed}, game {path.episode}{f': {cause}' if cause else ''}"
+        yield title, _figure([path], scene, f"worst-{place}", f"{title}; seen from above on the road.")
 
 
 def _figure(paths: Sequence[FailingPath], scene: Mapping[str, Any], name: str, alternative: str) -> Markup:

@@ -19,6 +19,7 @@ from harness.evaluation.strategies import (
     ReconfiguredEgo,
     RetrainedEgo,
     RobustEgo,
+    RoundAnswer,
     ShieldedEgo,
     SumoNonEgo,
     against_persona,
@@ -29,8 +30,12 @@ from harness.reports.numbers import percent
 from harness.reports.run_tables import Row, RunTables, failures, played
 from harness.reports.severity_wording import RISK_TONES, risk_tone
 
-NOBODY, ORDINARY, WORST_KNOWN = "nobody", "SUMO’s driver", "worst known opponent"
+NOBODY, WORST_KNOWN = "nobody", "worst known opponent"
+ORDINARY, ORDINARY_PERSON = "SUMO’s driver", "ordinary person"
+"""Who has the person's place in the control arm: a driver; or, where people do not drive, a walker or rider."""
 TAKES_OVER = "UN R157’s driver takes over"
+MOST_LINES, MOST_INTERVALS = 8, 24
+"""Lines of the table, and intervals below one another; with more of either it is dense."""
 AXES = (0.05, 0.1, 0.2, 0.4, 0.6, 1.0)
 """The ends that the common axis of failure rates may have."""
 
@@ -48,6 +53,8 @@ class FailureCell:
     """A key of `RISK_TONES`."""
     game: str = ""
     """The address of its worst game on the page; empty without one."""
+    arm: str = ""
+    """The arm, where the line and the column do not say it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,6 +85,7 @@ def failure_table(tables: RunTables, links: GameLinks) -> dict[str, Any] | None:
         "columns": columns,
         "lines": lines,
         "top": top,
+        "dense": len(lines) > MOST_LINES or len(lines) * len(tables.seeds) > MOST_INTERVALS,
         "tones": {tone: words for tone, words in RISK_TONES.items() if any(cell.tone == tone for cell in cells)},
     }
 
@@ -118,7 +126,8 @@ def _lines(tables: RunTables, links: GameLinks) -> Iterator[PersonLine]:
     judged = {persona: _taken_over(persona, tables) for persona in tables.personas}
     last: list[FailureCell | None] = [None] if any(judged.values()) else []
     yield PersonLine(person=NOBODY, cells=cells(None) + last, is_baseline=True)
-    yield PersonLine(person=ORDINARY, cells=cells(SumoNonEgo()) + last, is_baseline=True)
+    ordinary = ORDINARY if tables.non_ego_drives else ORDINARY_PERSON
+    yield PersonLine(person=ordinary, cells=cells(SumoNonEgo()) + last, is_baseline=True)
     if (baseline := tables.manifest.get("baseline")) and baseline not in tables.personas:
         yield PersonLine(person=baseline, cells=cells(PersonaNonEgo(persona=baseline)) + last, is_baseline=True)
     for persona in tables.personas:
@@ -127,20 +136,23 @@ def _lines(tables: RunTables, links: GameLinks) -> Iterator[PersonLine]:
         met = [_cell([against_persona(ego, persona).name for ego in column], tables, links) for column in own]
         yield PersonLine(person=persona, cells=[*met, judged[persona]] if last else met)
     known = [[name for name, arm in tables.arms.items() if arm.ego in column and _is_answer(arm)] for column in egos]
-    yield PersonLine(person=WORST_KNOWN, cells=[_cell(names, tables, links) for names in known] + last)
+    yield PersonLine(person=WORST_KNOWN, cells=[_cell(names, tables, links, named=True) for names in known] + last)
 
 
 def _is_answer(arm: Arm) -> bool:
-    """Whether a person of a later round, a best response or another ego's opponent plays an arm."""
+    """Whether a person of a later round, also one whose answer was rejected, a best response or another ego's opponent
+    plays an arm."""
     person = arm.non_ego
+    if isinstance(person, RoundAnswer):
+        return True
     if not isinstance(person, PersonaNonEgo) or person.borrowed is not None:
         return False
     is_other = isinstance(arm.ego, RetrainedEgo | ReconfiguredEgo) and arm.ego.against != person.persona
     return arm.best_response_of == NON_EGO or (arm.best_response_of is None and (person.round > 1 or is_other))
 
 
-def _cell(names: Sequence[str], tables: RunTables, links: GameLinks) -> FailureCell | None:
-    """The worst of some arms; None if none of them was played."""
+def _cell(names: Sequence[str], tables: RunTables, links: GameLinks, named: bool = False) -> FailureCell | None:
+    """The worst of some arms, with its name if `named`; None if none of them was played."""
     found = {name: list(tables.rates_of(name).values()) for name in names}
     found = {name: rows for name, rows in found.items() if rows}
     if not found:
@@ -153,6 +165,7 @@ def _cell(names: Sequence[str], tables: RunTables, links: GameLinks) -> FailureC
         spans=[(row["failure_rate"], row["failure_rate_low"], row["failure_rate_high"]) for row in rows],
         tone=_tone(rows),
         game=links.worst(name) if failed else "",
+        arm=name if named and failed else "",
     )
 
 

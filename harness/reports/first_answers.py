@@ -3,14 +3,16 @@ retraining does and at what price, and what to do now."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from harness.evaluation.comparisons.preventability import prevented_examples
+from harness.evaluation.competence import WITHHELD, Verdict
 from harness.evaluation.rule_book.causes import cause_lines
-from harness.evaluation.strategies import NAIVE_VS_SUMO, NaiveEgo, against_persona
+from harness.evaluation.strategies import NAIVE_VS_SUMO, PAPER_ROUNDS, NaiveEgo, against_persona, round_of
 from harness.reports.embedding import key
 from harness.reports.focus import Focus, focus_of
 from harness.reports.key_figures import egos_of
@@ -18,10 +20,12 @@ from harness.reports.next_steps import NextStep
 from harness.reports.numbers import NO_SPACE, number
 from harness.reports.run_tables import RunTables
 from harness.reports.severity_wording import severity_clause
-from harness.reports.verdict_wording import answer
+from harness.reports.verdict_wording import LABELS, NOT_ANSWERED, YES, Answer, answer
 
 MOST_PERSONAS = 3
 """Personas for which an answer has a line of its own; the verdicts have the others."""
+_VERDICTS = {"from_conflict": "from the conflict on", "from_start": "from the start"}
+"""The verdicts of preventability.csv on a failure, in words."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,19 +47,19 @@ def first_answers(tables: RunTables, steps: Sequence[NextStep]) -> list[FirstAns
     if not personas:
         return []
     focus = focus_of(tables)
-    told = [focus.persona] if focus is not None and focus.persona else personas[:MOST_PERSONAS]
+    told = list(_told(focus, personas, tables))
     answers = [
         FirstAnswer(question="Why does it fail?", lines=list(_why(focus, tables))),
         FirstAnswer(
             question="Could it have been prevented?",
-            lines=[each for name in told for each in _prevented(name, tables)],
-            game=next((game for name in told for game in _prevented_games(name, tables)), ""),
+            lines=[line for where, arms in told for line in _prevented(where, arms, tables)],
+            game=next((game for _, arms in told for game in _prevented_games(arms, tables)), ""),
             watch="Watch how a reference driver prevents one",
         ),
-        FirstAnswer(question="How severe is it?", lines=[each for name in told for each in _severe(name, tables)]),
+        FirstAnswer(question="How severe is it?", lines=list(_severe(focus, told, tables))),
         FirstAnswer(
-            question=f"Does {tables.change.doing} help, and what does it cost?",
-            lines=[each for name in personas[:MOST_PERSONAS] for each in _retrained(name, tables)],
+            question=f"Does {tables.change.in_short} help, and what does it cost?",
+            lines=list(_retrained(focus, personas, tables)),
         ),
     ]
     answers += [
@@ -65,18 +69,36 @@ def first_answers(tables: RunTables, steps: Sequence[NextStep]) -> list[FirstAns
     return [each for each in answers if each.lines]
 
 
+Told = tuple[str, Mapping[str, str]]
+"""Whom egos meet, as in " against speedy", and the egos by their arms."""
+
+
+def _told(focus: Focus | None, personas: Sequence[str], tables: RunTables) -> Iterator[Told]:
+    """The arms that the answers are about: those of the arm that matters most and of the egos of its person."""
+    if focus is None:
+        for persona in personas[:MOST_PERSONAS]:
+            yield f" against {persona}", {arm: made for _, made, arm in egos_of(persona, tables)}
+        return
+    arms = {focus.arm: focus.ego}
+    if focus.persona:
+        arms |= {arm: made for _, made, arm in egos_of(focus.persona, tables)}
+    yield _where(focus, tables), arms
+
+
+def _where(focus: Focus, tables: RunTables) -> str:
+    if focus.persona:
+        return f" against {focus.persona}"
+    return f" against an ordinary {tables.person}" if focus.arm == NAIVE_VS_SUMO.name else " alone"
+
+
 def _why(focus: Focus | None, tables: RunTables) -> Iterator[str]:
     """The most frequent cause of the failures of the arm that matters most, and of the naive ego against its person."""
     if focus is None:
         yield "No ego fails."
         return
-    arms = {focus.arm: focus.ego}
-    if focus.persona:
-        arms |= {arm: made for _, made, arm in egos_of(focus.persona, tables)}
+    ((where, arms),) = _told(focus, (), tables)
     for arm, ego in arms.items():
         failed, games = tables.counts_of(arm)
-        against = f" against {focus.persona}" if focus.persona else ""
-        where = against if arm != NAIVE_VS_SUMO.name else " against an ordinary driver"
         if failed:
             cause = next(iter(cause_lines(tables.causes[tables.causes["arm"] == arm])), "")
             share, _, words = cause.partition(": ")
@@ -86,54 +108,92 @@ def _why(focus: Focus | None, tables: RunTables) -> Iterator[str]:
             yield f"The {ego} does not fail{where}: the broken bound is of another kind."
     if baseline := tables.manifest.get("baseline"):
         failed, games = tables.counts_of(against_persona(NaiveEgo(), baseline).name)
-        if failed:
+        if failed and baseline != focus.persona:
             yield f"The {tables.naive} also fails against the baseline, {baseline}, in {failed} of {games} games."
 
 
-def _prevented(persona: str, tables: RunTables) -> Iterator[str]:
-    """What the driver of the regulation prevents against a persona, for each ego that fails."""
+def _prevented(where: str, arms: Mapping[str, str], tables: RunTables) -> Iterator[str]:
+    """What the driver of the regulation prevents, for each ego that fails."""
     clauses, not_judged = [], []
-    for _, made, arm in egos_of(persona, tables):
-        failed, _ = tables.counts_of(arm)
-        judged = tables.prevented_in(arm)
-        conflict, start = (sum(row[f"from_{when}_prevented"] for row in judged) for when in ("conflict", "start"))
-        if failed and judged:
-            clauses.append(f"{conflict} of {failed} of the {made} from the conflict on, {start} from the start")
-        elif failed:
+    for arm, made in arms.items():
+        rows = tables.prevented_in(arm)
+        found = []
+        for verdict, when in _VERDICTS.items():
+            prevented, judged = (sum(row[f"{verdict}_{count}"] for row in rows) for count in ("prevented", "judged"))
+            found += [f"{prevented} of {judged} {when}"] if judged else []
+        if found:
+            clauses.append(f"{made} {', '.join(found)}")
+        elif tables.counts_of(arm)[0]:
             not_judged.append(made)
     if clauses:
-        yield f"Of the failures against {persona} the driver of UN R157 prevents {'; '.join(clauses)}."
+        yield f"Of the failures{where} the driver of UN R157 prevents: {'; '.join(clauses)}."
     for made in not_judged:
-        yield f"The failures of the {made} against {persona} are not judged."
+        yield f"The failures of the {made}{where} are not judged."
 
 
-def _prevented_games(persona: str, tables: RunTables) -> Iterator[str]:
-    """The keys of the games that show how a reference driver prevents a failure against a persona."""
-    arms = {arm for _, _, arm in egos_of(persona, tables)}
+def _prevented_games(arms: Mapping[str, str], tables: RunTables) -> Iterator[str]:
+    """The keys of the games that show how a reference driver prevents a failure."""
     for (arm, seed), episode in prevented_examples(tables.takeovers).items():
         if arm in arms:
             yield key(arm, seed, episode)
 
 
-def _severe(persona: str, tables: RunTables) -> Iterator[str]:
-    """The severity of the collisions of the last ego that has any."""
-    clauses = [severity_clause(made, list(tables.rates_of(arm).values())) for _, made, arm in egos_of(persona, tables)]
-    for clause in [each for each in clauses if each][-1:]:
-        yield f"{clause[:1].upper()}{clause[1:]}."
+def _severe(focus: Focus | None, told: Sequence[Told], tables: RunTables) -> Iterator[str]:
+    """The severity of the collisions of the arm that matters most, or of the last ego that has any; and the severest
+    collision of the run, if it is another one."""
+    shown: set[str] = set()
+    for _, arms in told:
+        clauses = {arm: severity_clause(made, list(tables.rates_of(arm).values())) for arm, made in arms.items()}
+        found = [arm for arm, clause in clauses.items() if clause]
+        for arm in [focus.arm] if focus is not None and focus.arm in found else found[-1:]:
+            shown.add(arm)
+            yield f"{clauses[arm][:1].upper()}{clauses[arm][1:]}."
+    own = {name for name, arm in tables.arms.items() if arm.ego is not None and not arm.is_of_a_trait}
+    rows = [row for (arm, _), row in tables.rates.items() if arm in own and np.isfinite(row["max_delta_v_mps"])]
+    severest = max(rows, key=lambda row: row["max_delta_v_mps"], default=None)
+    if severest is not None and severest["arm"] not in shown:
+        yield f"The severest of the run: {number(severest['max_delta_v_mps'], 1)}{NO_SPACE}m/s, in {severest['arm']}."
 
 
-def _retrained(persona: str, tables: RunTables) -> Iterator[str]:
-    """The verdict on round 2, the failures, and the change of the average speed."""
-    if not tables.asked("RQ2", persona):
-        return
+def _retrained(focus: Focus | None, personas: Sequence[str], tables: RunTables) -> Iterator[str]:
+    """The verdict on round 2, the failures, and the change of the average speed: against the person of the arm that
+    matters most, then against those that the naive ego fails most often."""
+    asked = [each for each in personas if tables.asked("RQ2", each)]
+    first = focus.persona if focus is not None else ""
+    asked.sort(key=lambda each: (each != first, -tables.counts_of(tables.arms_of("RQ2", each)[0])[0]))
+    for persona in asked[:MOST_PERSONAS]:
+        yield _retrained_against(persona, tables)
+    if others := asked[MOST_PERSONAS:]:
+        mended = sum(answer(tables, "RQ2", each).label == YES for each in others)
+        yield f"Against {len(others)} more: yes for {mended}."
+
+
+def _retrained_against(persona: str, tables: RunTables) -> str:
     naive, changed = tables.arms_of("RQ2", persona)
     before, after = tables.counts_of(naive), tables.counts_of(changed)
-    given = answer(tables, "RQ2", persona)
-    text = f"Against {persona}: {given.label}. {before[0]} of {before[1]} failures become {after[0]} of {after[1]}"
+    text = f"Against {persona}: {_label(answer(tables, 'RQ2', persona))}. "
+    text += f"{before[0]} failures in {before[1]} games become {after[0]}"
+    text += f" in {after[1]}" if after[1] != before[1] else ""
+    last = tables.last_ego(persona)
+    if round_of(last) > PAPER_ROUNDS:
+        failed, games = tables.counts_of(against_persona(last, persona).name)
+        text += f", and {failed} in {games} after round {round_of(last)}"
     faster = _speed_mps(changed, tables) - _speed_mps(naive, tables)
     if np.isfinite(faster):
         text += f"; {number(abs(faster), 2)}{NO_SPACE}m/s {'faster' if faster > 0 else 'slower'} on average"
-    yield f"{text}."
+    return f"{text}."
+
+
+def _label(given: Answer) -> str:
+    """The answer, and if too few trainings give one, why the others do not."""
+    if given.label != LABELS[Verdict.NOT_ENOUGH_TRAININGS]:
+        return given.label
+    why = Counter(each.label.removeprefix(f"{NOT_ANSWERED}: ") for each in given.per_seed if each.label in _WITHHELD)
+    reasons = [f"in {count} of {len(given.per_seed)} {reason}" for reason, count in why.items()]
+    return f"{given.label} ({'; '.join(reasons)})" if reasons else given.label
+
+
+_WITHHELD = [LABELS[verdict] for verdict in WITHHELD]
 
 
 def _speed_mps(arm: str, tables: RunTables) -> float:

@@ -36,7 +36,8 @@ def focus_of(tables: RunTables) -> Focus | None:
 
 
 def _candidates(tables: RunTables) -> Iterator[Focus]:
-    for arm, where in ((NAIVE_ALONE.name, "fails alone"), (NAIVE_VS_SUMO.name, "fails against an ordinary driver")):
+    ordinary = f"fails against an ordinary {tables.person}"
+    for arm, where in ((NAIVE_ALONE.name, "fails alone"), (NAIVE_VS_SUMO.name, ordinary)):
         if failed := tables.counts_of(arm)[0]:
             yield Focus(arm=arm, ego=tables.naive, persona="", happens=f"the {tables.naive} {where}", failed=failed)
     for check in worst_of_each(tables.acceptance or ()):

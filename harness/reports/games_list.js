@@ -17,10 +17,14 @@ class GamesList {
   /** Make the table, which takes a while for thousands of games. */
   fill() {
     if (this.api) return;
-    const rows = [...games].map(([key, game]) => ({
+    const worstFirst = [...games].sort(([, a], [, b]) => b.severity - a.severity
+      || (a.leastTime ?? Infinity) - (b.leastTime ?? Infinity) || 0);
+    const rows = worstFirst.map(([key, game]) => ({
       key, arm: game.arm, game: `${game.episode}`, seed: game.seed, outcome: OUTCOMES[game.outcome] ?? game.outcome,
-      time: game.leastTime ?? "",
+      time: game.leastTime ?? "", deltaV: game.deltaV ?? "",
+      cause: game.cause + (game.reference ? `${game.cause && "; "}prevented by the ${game.reference.driver}` : ""),
     }));
+    const shown = digits => (value, type) => (type !== "display" ? value : value === "" ? "–" : value.toFixed(digits));
     const opens = (text, type, row) => (type === "display" ? `<a href="#game=${row.key}">${text}</a>` : text);
     this.api = dataTable(this.table, rows.length, {
       data: rows, pageLength: SHOWN_GAMES,
@@ -28,7 +32,9 @@ class GamesList {
       columns: [
         { data: "game", render: opens, cellType: "th", title: "game" }, { data: "seed", title: "seed", visible: severalSeeds },
         { data: "outcome", className: "text", title: "outcome", render: DataTable.render.text() },
-        { data: "time", title: "least TTC (s)", render: (value, type) => (type === "display" ? (value === "" ? "–" : value.toFixed(2)) : value) },
+        { data: "deltaV", title: "delta-v (m/s)", render: shown(1) },
+        { data: "time", title: "least TTC (s)", render: shown(2) },
+        { data: "cause", className: "text", title: "why", render: DataTable.render.text() },
         { data: "arm", visible: false, render: DataTable.render.text() },
       ],
       createdRow: (row, { key }) => {
@@ -36,7 +42,7 @@ class GamesList {
         row.dataset.key = key;
       },
     });
-    this.api.column(4).search.fixed("arm", arm => this.arm === null || arm === this.arm);
+    this.api.column(6).search.fixed("arm", arm => this.arm === null || arm === this.arm);
     this.api.on("draw", () => this.mark());
     const outcomes = [...new Set(rows.map(row => row.outcome))];
     this.filter.append(...outcomes.map(outcome => make("option", { value: outcome, text: outcome })));

@@ -1,15 +1,17 @@
-"""How players came to be: the learning curves of trainings, and the searches of egos that can't be trained."""
+"""How players came to be: the learning curves of trainings with their events, and the searches of egos that can't be
+trained."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import pandas as pd
 from markupsafe import Markup
 
+from harness.config.training import ATTENTIVE_SHARE, Training
 from harness.evaluation.competence import DID_NOT_LEARN
-from harness.evaluation.strategies import NaiveEgo, Strategy, player_of
+from harness.evaluation.strategies import ManyPersonas, NaiveEgo, PersonaNonEgo, Strategy, player_of
 from harness.game.roles import EGO
 from harness.reports.figures import INK, SERIES, figure_of, svg
 from harness.reports.numbers import MISSING, number, percent, short, steps_text, trimmed
@@ -24,6 +26,7 @@ def learning(tables: RunTables) -> list[dict[str, Any]]:
     for place, stage in enumerate(training["stage"].unique(), 1):
         rows = training[training["stage"] == stage]
         entries = {seed: tables.stages.get(f"{stage}-seed{seed}", {}) for seed in sorted(rows["seed"].unique())}
+        events = {seed: _events(str(stage), entry, tables) for seed, entry in entries.items()}
         stops = {
             seed: f"{entry['steps']:,} steps ({stopped(entry)})"
             for seed, entry in entries.items()
@@ -32,17 +35,66 @@ def learning(tables: RunTables) -> list[dict[str, Any]]:
         found.append(
             {
                 "stage": str(stage),
-                "figure": _learning_figure(rows, entries, _series(tables.strategies.get(str(stage))), place),
+                "figure": _learning_figure(rows, entries, events, _series(tables.strategies.get(str(stage))), place),
                 "stops": [f"seed {seed}: {text}" if len(entries) > 1 else text for seed, text in stops.items()],
+                "events": _told(events),
             }
         )
     return found
 
 
+class _Event(NamedTuple):
+    """What changes in a training after so many steps."""
+
+    steps: int
+    words: str
+
+
+LAPSES_BEGIN, NARROWS = "lapses of attention begin", "actions become narrow"
+
+
+def _events(stage: str, entry: Mapping[str, Any], tables: RunTables) -> list[_Event]:
+    """The events of a training that has ended, in order: when a person's lapses of attention begin, and when the last
+    part begins, in which the deviation of its actions becomes narrow. Its end is no event."""
+    steps, budget = entry.get("steps"), entry.get("budget_steps")
+    if steps is None or budget is None:
+        return []
+    found, strategy = [], tables.strategies.get(stage)
+    documents = tables.manifest.get("persona_documents", {})
+    learners = strategy.personas if isinstance(strategy, ManyPersonas) else (entry.get("persona", ""),)
+    is_of_round_1 = isinstance(strategy, PersonaNonEgo) and strategy.round == 1
+    learns_attentive = is_of_round_1 or isinstance(strategy, ManyPersonas)
+    if learns_attentive and any((documents.get(each) or {}).get("attention") for each in learners):
+        found.append(_Event(round(ATTENTIVE_SHARE * budget), LAPSES_BEGIN))
+    share = tables.campaign.get("training", {}).get("narrowing_share", Training().narrowing_share)
+    end = steps if entry.get("stopped") == "converged" else budget
+    if share:
+        found.append(_Event(max(round(end - share * budget), 0), NARROWS))
+    return sorted(each for each in found if each.steps < steps)
+
+
+def _told(events: Mapping[int, Sequence[_Event]]) -> list[str]:
+    """The events in words; those of several seeds that are at the same step as one."""
+    seeds: dict[_Event, list[int]] = {}
+    for seed, found in events.items():
+        for each in found:
+            seeds.setdefault(each, []).append(seed)
+    lines = []
+    for event in sorted(seeds):
+        whose = f"seed {', '.join(map(str, seeds[event]))}: " if len(seeds[event]) < len(events) else ""
+        lines.append(f"{whose}{event.words} at {steps_text(event.steps)}")
+    return lines
+
+
 def _learning_figure(
-    training: pd.DataFrame, entries: Mapping[int, Mapping[str, Any]], series: str, place: int
+    training: pd.DataFrame,
+    entries: Mapping[int, Mapping[str, Any]],
+    events: Mapping[int, Sequence[_Event]],
+    series: str,
+    place: int,
 ) -> Markup:
-    """Mean payoff and failure rate of the learner over its steps, a line per seed, and where each stopped."""
+    """Mean payoff and failure rate of the learner over its steps, a line per seed, where each stopped, and dotted lines
+    at the events."""
     with figure_of(3.7, 3.9) as figure:
         payoff, failure = figure.subplots(2, 1, sharex=True)
         ends = []
@@ -56,6 +108,9 @@ def _learning_figure(
             if entry.get("steps") is not None:
                 for axes in (payoff, failure):
                     axes.axvline(entry["steps"], color=INK, linewidth=1, linestyle=linestyle)
+        for event in {each for found in events.values() for each in found}:
+            for axes in (payoff, failure):
+                axes.axvline(event.steps, color=INK, linewidth=0.8, linestyle=":")
         first = next(iter(entries.values()))
         if len(entries) > 1:
             payoff.legend(frameon=False, fontsize=8)

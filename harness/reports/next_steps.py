@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 from harness.config.training import Training
 from harness.evaluation.competence import DID_NOT_LEARN
+from harness.evaluation.strategies import strategy_name
 from harness.evaluation.worst_first import worst_first
 from harness.reports.embedding import key
-from harness.reports.focus import focus_of
+from harness.reports.focus import Focus, focus_of
 from harness.reports.game_links import replay_command
 from harness.reports.provenance import command_of
 from harness.reports.run_tables import RunTables
@@ -31,8 +32,19 @@ class NextStep:
 
 def next_steps(tables: RunTables) -> list[NextStep]:
     """The first few steps that this run suggests, the most urgent first."""
-    steps = [*_finish(tables), *to_learn(tables), *_watch(tables), *_widen(tables)]
-    return steps[:MOST_STEPS]
+    watch, learn = list(_watch(tables)), list(to_learn(tables))
+    urgent = [*watch, *learn] if _has_learned(focus_of(tables), tables) else [*learn, *watch]
+    return [*_finish(tables), *urgent, *_widen(tables)][:MOST_STEPS]
+
+
+def _has_learned(focus: Focus | None, tables: RunTables) -> bool:
+    """Whether the players of the arm that matters most learned to drive the scene; False without such an arm."""
+    if focus is None or focus.arm not in tables.arms:
+        return False
+    arm = tables.arms[focus.arm]
+    players = [strategy_name(each) for each in (arm.ego, arm.non_ego) if each is not None]
+    entries = [tables.stages.get(f"{player}-seed{seed}", {}) for player in players for seed in tables.seeds]
+    return all(each.get("stopped") != DID_NOT_LEARN for each in entries)
 
 
 def _finish(tables: RunTables) -> Iterator[NextStep]:

@@ -14,7 +14,7 @@ from harness.reports.cards import CAUTION, card
 from harness.reports.data_table import table
 from harness.reports.differences import METRIC_WORDS, effect
 from harness.reports.embedding import GameTracks, embedded_games, recorded_document
-from harness.reports.failing_paths import FailingPath
+from harness.reports.failing_paths import FailingPath, worst_figures
 from harness.reports.failure_table import failure_table
 from harness.reports.first_answers import first_answers
 from harness.reports.game import game_section, selection_sentences
@@ -62,10 +62,11 @@ def render_page(
     `games`, those to watch first at the front, are embedded as far as they fit (`GAMES_BYTES`); `paths` are drawn over
     one another. Without a `scene`, the road as `road.js` reads it, there are neither.
     """
+    causes = causes_by_game(tables.causes)
     texts = embedded_games(
         games if scene is not None else (),
         marks_of(tables.manoeuvres),
-        causes_by_game(tables.causes),
+        causes,
         tables.crowds,
         GAMES_BYTES,
     )
@@ -80,6 +81,7 @@ def render_page(
         most_broken=MOST_BROKEN,
         failure_table=failure_table(tables, links),
         answers=first_answers(tables, steps),
+        worst=list(worst_figures(paths, scene, causes, tables.several_seeds)) if scene is not None else [],
         attribution=attribution_section(tables, links),
         starts=start_section(tables, links),
         next_steps=steps,

@@ -32,12 +32,12 @@ class Player {
     this.screens = chosen.map(game => new GameScreen(game, at => { this.pause(); this.seek(at); }));
     this.element.replaceChildren(...this.screens.map(screen => screen.element));
     this.arrange();
-    const ranges = rangesOf(chosen);
+    const strips = stripsOf(chosen);
     for (const screen of this.screens) {
       screen.others = chosen.filter(game => game !== screen.game);
       screen.camera.follows = this.follows;
       screen.start();
-      screen.strips.align(ranges, this.duration);
+      screen.strips.align(strips, this.duration);
     }
     this.seek(time ?? momentOf(chosen[0]));
     return true;

@@ -139,6 +139,11 @@ function titleOf(game) {
   return `${game.arm}, ${severalSeeds ? `seed ${game.seed}, ` : ""}game ${game.episode}`;
 }
 
+/** How a game ended, and how severe the collision was. */
+function outcomeOf(game) {
+  return (OUTCOMES[game.outcome] ?? game.outcome) + (game.deltaV === null ? "" : `, delta-v ${game.deltaV.toFixed(1)} m/s`);
+}
+
 function describe(game) {
   const nearest = game.leastTime === null || game.leastTime === 0 ? "" : `, least TTC ${game.leastTime.toFixed(1)} s`;
   return `game ${game.episode}${severalSeeds ? `, seed ${game.seed}` : ""}: ${OUTCOMES[game.outcome] ?? game.outcome}${nearest}`;

@@ -46,13 +46,17 @@ class Change(NamedTuple):
     """The ego of round 2 in sentences."""
     doing: str
     """What round 2 does, in sentences."""
+    in_short: str
+    """The same in a heading."""
     ego: Callable[[str], EgoStrategy]
     """The ego of round 2 as a strategy, by the persona that it meets."""
 
 
-RETRAINED = Change("retrained", "retraining", lambda persona: RetrainedEgo(against=persona))
-RECONFIGURED = Change("reconfigured", "reconfiguration", lambda persona: ReconfiguredEgo(against=persona))
-ROBUST = Change("robust", "retraining against several personas", lambda persona: RobustEgo())
+RETRAINED = Change("retrained", "retraining", "retraining", lambda persona: RetrainedEgo(against=persona))
+RECONFIGURED = Change(
+    "reconfigured", "reconfiguration", "reconfiguration", lambda persona: ReconfiguredEgo(against=persona)
+)
+ROBUST = Change("robust", "retraining against several personas", "retraining", lambda persona: RobustEgo())
 
 
 def _empty(name: str) -> Callable[[], pd.DataFrame]:

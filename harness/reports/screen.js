@@ -64,7 +64,7 @@ class GameScreen {
 
   heading() {
     const { game } = this;
-    const badge = make("span", { class: `badge ${game.outcome === "goal" ? "well" : "failed"}`, text: OUTCOMES[game.outcome] ?? game.outcome });
+    const badge = make("span", { class: `badge ${game.outcome === "goal" ? "well" : "failed"}`, text: outcomeOf(game) });
     const title = make("h3", {}, document.createTextNode(`${titleOf(game)} `), badge);
     if (game.reference) {
       const from = (game.reference.players[0].first * game.step).toFixed(1);

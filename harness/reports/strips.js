@@ -1,29 +1,31 @@
-// The curves under a game: speed, acceleration, steering, gap and time to collision of its players. uPlot draws them.
+// The curves under a game: speed, time to collision, gap, acceleration and steering of its players. uPlot draws them.
 
 const STRIPS = [
   { name: "speed", unit: "m/s", column: "speed", from: 0 },
+  { name: "time to collision", unit: "s", column: "time", from: 0, most: 10 },
+  { name: "gap ahead", unit: "m", column: "gap", from: 0, most: 60 },
   { name: "acceleration", unit: "m/s²", column: "acceleration", from: -1, to: 1 },
   { name: "steering", unit: "°", column: "steering", factor: 180 / Math.PI, from: -2, to: 2 },
-  { name: "gap ahead", unit: "m", column: "gap", from: 0, most: 60 },
-  { name: "time to collision", unit: "s", column: "time", from: 0, most: 10 },
 ];
 const ROW = 46, AXIS = 20, LEFT = 34, RIGHT = 10;
 const TOGETHER = 8; // in % of the width: manoeuvres that begin closer to one another share a label
 
-/** The range of each strip over some games, so that games side by side have the same axes. */
-function rangesOf(shown) {
-  return STRIPS.map(({ column, factor = 1, from = 0, to = 0.1, most = Infinity }) => {
+/** The strips of some games, without those that would be empty: each with its range over all of them, so that games
+    side by side have the same axes. */
+function stripsOf(shown) {
+  const tracks = shown.flatMap(game => game.players);
+  const measured = STRIPS.filter(({ column }) => tracks.some(track => track[column].some(value => !Number.isNaN(value))));
+  return measured.map(strip => {
+    const { column, factor = 1, from = 0, to = 0.1, most = Infinity } = strip;
     let [low, high] = [from, to];
-    for (const game of shown) {
-      for (const track of game.players) {
-        for (const value of track[column]) {
-          if (Number.isNaN(value)) continue;
-          low = Math.min(low, value * factor);
-          high = Math.max(high, Math.min(value * factor, most));
-        }
+    for (const track of tracks) {
+      for (const value of track[column]) {
+        if (Number.isNaN(value)) continue;
+        low = Math.min(low, value * factor);
+        high = Math.max(high, Math.min(value * factor, most));
       }
     }
-    return [low, high + 0.04 * (high - low)];
+    return { ...strip, range: [low, high + 0.04 * (high - low)] };
   });
 }
 
@@ -46,12 +48,12 @@ class Strips {
     this.onDrag(seek);
   }
 
-  /** Draw with the axes of all games that are shown. */
-  align(ranges, until) {
-    Object.assign(this, { ranges, until });
+  /** Draw the strips of all games that are shown. */
+  align(strips, until) {
+    this.until = until;
     for (const { plot } of this.plots) plot.destroy();
     this.element.replaceChildren(...this.lanes());
-    this.plots = STRIPS.map((strip, row) => this.plotted(strip, row));
+    this.plots = strips.map((strip, row) => this.plotted(strip, row === strips.length - 1));
     this.draw(this.time);
   }
 
@@ -104,8 +106,8 @@ class Strips {
   }
 
   /** One strip: its heading with the values of the moment, and its plot. */
-  plotted({ name, unit, column, factor = 1 }, row) {
-    const { game } = this, [low, high] = this.ranges[row], last = row === STRIPS.length - 1;
+  plotted({ name, unit, column, factor = 1, range: [low, high] }, last) {
+    const { game } = this;
     const values = game.players.map(track => make("b", { class: track.name === "ego" ? "ego" : "non-ego" }));
     const place = make("div");
     this.element.append(make("p", { class: "strip" }, make("span", { text: `${name} (${unit})` }), ...values), place);

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import gzip
 import math
 
 import pandas as pd
@@ -202,6 +203,24 @@ def test_read_csv__returns_the_written_table(tmp_path, table):
     first = path.read_bytes()
     write_csv(again, path)
     assert path.read_bytes() == first
+
+
+def test_read_csv__reads_the_compressed_file_where_the_other_is_missing(tmp_path, monkeypatch):
+    rows = table_of("training", [{"stage": "naive", "seed": 1, "steps": 10, "games": 2}] * 100)
+    path = tmp_path / "training.csv"
+    write_csv(rows, path)
+    content = path.read_bytes()
+    path.unlink()
+    packed = tmp_path / "training.csv.gz"
+    packed.write_bytes(gzip.compress(content))
+    assert read_csv(path).equals(rows)
+    packed.write_bytes(gzip.compress(content)[:-9])
+    with pytest.raises(UsageError, match="is not a table of this harness"):
+        read_csv(path)
+    packed.write_bytes(gzip.compress(content))
+    monkeypatch.setattr("harness.evaluation.tables._MOST_BYTES", len(content) - 1)
+    with pytest.raises(UsageError, match="it has more than"):
+        read_csv(path)
 
 
 @pytest.mark.parametrize(

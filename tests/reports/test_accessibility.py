@@ -40,8 +40,10 @@ def test_report__has_no_violation_without_recorded_games(opened, tmp_path):
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_index__of_runs_and_the_page_of_a_running_one_have_no_violation(opened, tmp_path, scheme):
-    cell = WorstCell(arm="naive_vs_speedy", failures=3, games=100)
-    done = {"ego": "learned", "scene": "merge", "personas": ["speedy"], "seeds": [1], "finished_on": "2026-11-25"}
+    cell = WorstCell(arm="retrained_speedy_round4_vs_speedy_round3_rejected", failures=3, games=100)
+    people = ["careful", "speedy", "late_merger"]
+    done = {"ego": "learned", "scene": "priority_crossing", "personas": people, "seeds": [1, 2, 3]}
+    done |= {"finished_on": "2026-11-25"}
     runs = [
         IndexedRun(folder=tmp_path / "a", name="a", state="ended", accepted=False, naive=cell, has_page=True, **done),
         IndexedRun(folder=tmp_path / "b", name="b", state="ended", accepted=True, naive=cell, has_page=True, **done),
@@ -55,4 +57,7 @@ def test_index__of_runs_and_the_page_of_a_running_one_have_no_violation(opened, 
     for name, text in pages.items():
         path = tmp_path / f"{name}.html"
         path.write_text(text, encoding="utf-8")
-        assert accessibility_violations(opened(path, color_scheme=scheme)) == []
+        page = opened(path, color_scheme=scheme)
+        inside = "each => each.scrollWidth <= each.clientWidth"
+        assert all(region.evaluate(inside) for region in page.locator(".scroll:has(#runs)").all())
+        assert accessibility_violations(page) == []

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
+from harness.reports.failing_paths import FailingPath
+from harness.reports.page import render_page
+from harness.reports.run_tables import RunTables
 from tests.support.chromium import COLOURS, contrast, unfold
 from tests.support.game_tables import findings
 from tests.support.pages import campaign, cannot_drive, with_errors
+from tests.support.recorded import SCENE
 
 
 @pytest.fixture(scope="module")
@@ -68,6 +73,26 @@ def test_report__a_person_that_cannot_drive_is_on_the_first_screen(width, opened
     learning = page.locator("#learning")
     assert learning.get_by_text("did not learn: goal in 0 of 60 games alone").last.is_visible()
     assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+def test_report__the_first_page_on_paper_has_the_worst_games_and_is_one_page_of_a4(opened, tmp_path):
+    players = {"ego": np.array([[60.0, -1.6], [90.0, -1.6]]), "non_ego": np.array([[60.0, -4.8], [90.0, -2.6]])}
+    paths = [
+        FailingPath(
+            arm="naive_vs_speedy", persona="speedy", players=players, contact_m=(90.0, -2.0), seed=1, episode=each
+        )
+        for each in range(4)
+    ]
+    arguments = campaign(personas=["speedy", "distracted", "texting"])
+    html = render_page(RunTables(**arguments), (), SCENE, paths)
+    path = tmp_path / "report.html"
+    path.write_text(html, encoding="utf-8")
+    page = opened(path, width=703)  # pixels: 210 mm without margins of 12 mm
+    assert page.locator(".worst").is_hidden()
+    page.emulate_media(media="print")
+    assert page.locator(".worst svg").count() == 3
+    first, header = page.locator("#first").bounding_box(), page.locator("header").bounding_box()
+    assert first["y"] + first["height"] - header["y"] < 1032  # pixels: 297 mm without margins
 
 
 def test_report__no_column_and_no_fold_is_cut_on_paper(opened):

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 
-from harness.reports.failing_paths import FailingPath, paths_figures
+from harness.reports.failing_paths import FailingPath, paths_figures, worst_figures
 from tests.support.recorded import SCENE
 
 LABELS = {"naive_vs_speedy": "naive ego, against speedy", "retrained_vs_speedy": "retrained ego, against speedy"}
@@ -35,6 +36,17 @@ def test_picture__says_how_many_of_the_failures_it_has():
     (naive, retrained) = pictures([path(), path("retrained_vs_speedy")], naive_vs_speedy=70, retrained_vs_speedy=1)
     assert naive[0] == "The naive ego, against speedy: 1 of 70 failures"
     assert retrained[0] == "The retrained ego, against speedy: the only failure"
+
+
+def test_worst__are_a_picture_each_with_the_cause():
+    paths = [replace(path(), episode=episode, seed=2) for episode in (5, 3, 8, 1)]
+    found = list(worst_figures(paths, SCENE, {"naive_vs_speedy,2,5": "cuts in"}, several_seeds=True))
+    assert [title for title, _ in found] == [
+        "naive_vs_speedy, seed 2, game 5: cuts in",
+        "naive_vs_speedy, seed 2, game 3",
+        "naive_vs_speedy, seed 2, game 8",
+    ]
+    assert all("var(--ego)" in picture for _, picture in found)
 
 
 def test_picture__an_arm_without_a_failure_has_none():

@@ -5,7 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 from harness.evaluation.comparisons.acceptance_checks import Check
-from harness.evaluation.strategies import Arm, Borrowed, NaiveEgo, PersonaNonEgo, RetrainedEgo, against_persona
+from harness.evaluation.competence import DID_NOT_LEARN
+from harness.evaluation.strategies import (
+    Arm,
+    Borrowed,
+    NaiveEgo,
+    PersonaNonEgo,
+    RetrainedEgo,
+    RoundAnswer,
+    against_persona,
+)
 from harness.evaluation.tables import table_of
 from harness.reports.failure_table import TAKES_OVER, WORST_KNOWN, failure_table
 from harness.reports.first_answers import first_answers
@@ -15,7 +24,7 @@ from harness.reports.next_steps import next_steps
 from harness.reports.numbers import NO_SPACE
 from harness.reports.run_tables import RunTables
 from tests.support.game_tables import arm, table
-from tests.support.pages import campaign, recomputed
+from tests.support.pages import campaign, cannot_drive, recomputed
 
 LAWFUL = {"sumo": 0.0}
 """No failure against the ordinary driver."""
@@ -75,6 +84,12 @@ def test_table__its_axis_ends_above_every_interval():
     assert table_in(run_of(failing=LAWFUL | {"naive": 0.0, "retrained": 0.0}))["top"] == 0.1  # 0 of 60: to 6 %
 
 
+def test_table__of_many_people_or_trainings_is_dense():
+    assert not table_in(run_of(personas=("speedy", "distracted")))["dense"]
+    assert table_in(run_of(personas=[f"person{each}" for each in "abcdefg"]))["dense"]
+    assert table_in(run_of(seeds=range(1, 10)))["dense"]
+
+
 def test_table__warns_of_an_ego_that_fails_where_no_persona_takes_part():
     assert [line.person for line in table_in(run_of())["lines"] if line.warns] == []
     assert [line.person for line in table_in(run_of(failing={"sumo": 0.05}))["lines"] if line.warns] == [
@@ -97,6 +112,18 @@ def test_table__the_worst_known_opponent_is_of_a_later_round_or_newly_trained():
     assert WORST_KNOWN not in texts(run_of())
     assert texts(with_arms((later, 6), (newly, 3)))[WORST_KNOWN] == [None, "10 %, 6 of 60"]
     assert texts(with_arms((later, 3), (newly, 6)))[WORST_KNOWN] == [None, "10 %, 6 of 60"]
+
+
+def test_table__a_rejected_answer_is_a_known_opponent_and_named():
+    rejected = RoundAnswer(of=PersonaNonEgo(persona="speedy", round=3), is_rejected=True)
+    run = with_arms((Arm(ego=NaiveEgo(), non_ego=rejected), 6))
+    assert texts(run)[WORST_KNOWN] == ["10 %, 6 of 60", None]
+    assert table_in(run)["lines"][-1].cells[0].arm == "naive_vs_speedy_round3_rejected"
+    assert {cell.arm for line in table_in(run)["lines"][:-1] for cell in line.cells if cell} == {""}
+
+
+def test_table__people_on_foot_are_no_drivers():
+    assert "ordinary person" in texts(run_of(non_ego_drives=False))
 
 
 def test_table__a_person_with_the_trait_of_another_is_no_opponent():
@@ -127,6 +154,14 @@ def test_focus__is_first_the_ordinary_driver_then_the_broken_bound_then_the_last
     assert focus_of(run_of(failing=LAWFUL | {"naive": 0.0, "retrained": 0.0})) is None
 
 
+def test_next_step__is_the_worst_game_unless_a_player_of_it_did_not_learn():
+    arguments = campaign(personas=["speedy", "distracted"], failing=LAWFUL)
+    arguments["manifest"]["stages"]["distracted-seed1"]["stopped"] = DID_NOT_LEARN
+    assert next_steps(RunTables(**arguments))[0].sentence.startswith("See how")  # the focus is on speedy
+    arguments["manifest"]["stages"]["speedy-seed1"]["stopped"] = DID_NOT_LEARN
+    assert next_steps(RunTables(**arguments))[0].sentence.startswith("Double the budget")
+
+
 def test_next_step__is_a_game_of_the_broken_bound():
     step = next_steps(run_of(acceptance=[broken("near_miss_rate", "naive_vs_speedy")]))[0]
     assert step.command.startswith("harness replay . naive_vs_speedy ")
@@ -148,15 +183,62 @@ def test_answers__say_how_often_each_ego_fails_and_what_retraining_costs():
         "The naive ego fails against speedy in 18 of 60 games.",
     ]
     assert given["Could it have been prevented?"] == [
-        "Of the failures against speedy the driver of UN R157 prevents 12 of 18 of the naive ego from the conflict on, "
-        "1 from the start.",
+        "Of the failures against speedy the driver of UN R157 prevents: naive ego 12 of 18 from the conflict on, "
+        "1 of 18 from the start.",
         "The failures of the retrained ego against speedy are not judged.",
     ]
     assert answers(run_of())["Could it have been prevented?"] == [
-        f"The failures of the {ego} ego against speedy are not judged." for ego in ("naive", "retrained")
+        f"The failures of the {ego} ego against speedy are not judged." for ego in ("retrained", "naive")
     ]
     (line,) = given["Does retraining help, and what does it cost?"]
-    assert line.startswith("Against speedy: yes. 18 of 60 failures become 2 of 60; ")
+    assert line.startswith("Against speedy: yes. 18 failures in 60 games become 2; ")
+
+
+def test_answers__a_failure_without_a_conflict_is_judged_from_the_start_only():
+    row = judged(failures=18, prevented=12) | {"from_conflict_judged": 0, "from_conflict_prevented": 0}
+    given = answers(run_of(preventability=table_of("preventability", [row])))
+    assert given["Could it have been prevented?"][0] == (
+        "Of the failures against speedy the driver of UN R157 prevents: naive ego 1 of 18 from the start."
+    )
+
+
+def test_answers__about_the_ordinary_driver_are_not_about_a_persona():
+    row = judged(failures=18, prevented=12)
+    given = answers(run_of(failing={"sumo": 0.05}, preventability=table_of("preventability", [row])))
+    assert given["Why does it fail?"] == ["The naive ego fails against an ordinary driver in 3 of 60 games."]
+    assert given["Could it have been prevented?"] == [
+        "The failures of the naive ego against an ordinary driver are not judged."
+    ]
+
+
+def test_answers__name_the_severest_collision_of_the_run_if_it_is_another():
+    run = run_of(personas=("speedy", "distracted"))
+    run.summary["max_delta_v_mps"] = run.summary["arm"].map({"naive_vs_distracted": 8.0, "retrained_vs_speedy": 2.0})
+    assert answers(run)["How severe is it?"][-1] == "The severest of the run: 8.0 m/s, in naive_vs_distracted."
+    run.summary["max_delta_v_mps"] = run.summary["arm"].map({"retrained_vs_speedy": 2.0})
+    assert "severest" not in " ".join(answers(replace(run))["How severe is it?"])
+
+
+def test_answers__on_retraining_begin_with_the_person_that_matters_most_and_count_the_rest():
+    people = ("speedy", "distracted", "texting", "drowsy", "careful")
+    bound = replace(broken("near_miss_rate", "retrained_vs_drowsy"), persona="drowsy")
+    lines = answers(run_of(personas=people, acceptance=[bound]))["Does retraining help, and what does it cost?"]
+    assert [line.split(":")[0] for line in lines] == [
+        "Against drowsy", "Against speedy", "Against distracted", "Against 2 more",
+    ]  # fmt: skip
+    assert lines[-1] == "Against 2 more: yes for 2."
+
+
+def test_answers__on_retraining_tell_a_later_round_too():
+    later = Arm(ego=RetrainedEgo(against="speedy", round=4), non_ego=PersonaNonEgo(persona="speedy"))
+    (line,) = answers(with_arms((later, 5)))["Does retraining help, and what does it cost?"]
+    assert "18 failures in 60 games become 2, and 5 in 60 after round 4; " in line
+
+
+def test_answers__too_few_trainings_say_why():
+    arguments = cannot_drive(campaign(personas=["speedy"], failing=LAWFUL, seeds=(1, 2, 3)), seeds=(1,))
+    (line,) = answers(RunTables(**arguments))["Does retraining help, and what does it cost?"]
+    assert line.startswith("Against speedy: not answered: not enough trainings (in 1 of 3 the person can't drive ")
 
 
 def test_answers__a_broken_bound_without_a_failure_is_no_failure():

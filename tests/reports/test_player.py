@@ -273,6 +273,34 @@ def test_list__next_follows_its_order_and_its_filter(player, games):
         press(page, "n")
 
 
+def test_list__begins_with_the_worst_game_of_an_arm_and_says_how_severe_and_why(player, games):
+    page = player()
+    page.locator(".games-list summary").click()
+    listed = page.locator(".games-list tbody tr")
+    keys = [listed.nth(place).get_attribute("data-key") for place in range(listed.count())]
+    severities = [games[each].severity for each in keys]
+    assert len(keys) > 2
+    assert severities == sorted(severities, reverse=True)
+    assert listed.first.locator("td").all_inner_texts()[:2] == ["collision", f"{games[keys[0]].delta_v_mps:.1f}"]
+    assert "1.2 s before the end; the ego: " in listed.first.inner_text()
+    assert "collision, delta-v 2.6 m/s" in page.locator(".screen h3").first.inner_text()  # game 6
+    prevented = page.locator(f'.games-list tr[data-key="{JUDGED}"]')
+    while prevented.count() == 0:
+        page.locator(".games-list .dt-paging-button.next").click()
+    assert "prevented by the careful and competent driver" in prevented.inner_text()
+
+
+def test_strips__time_to_collision_is_on_the_first_screen_and_none_is_empty(player):
+    page = player()
+    names = [each.partition(" (")[0] for each in page.locator(".curves .strip span").all_inner_texts()]
+    assert names == ["speed", "time to collision", "gap ahead", "acceleration", "steering"]
+    bottom = page.locator(".curves .strip").nth(1).bounding_box()["y"] + 60  # pixels: its heading and its plot
+    assert bottom - page.locator(".player").bounding_box()["y"] < 800
+    alone = player("#game=naive_alone,1,20")
+    names = [each.partition(" (")[0] for each in alone.locator(".curves .strip span").all_inner_texts()]
+    assert names == ["speed", "acceleration", "steering"]
+
+
 # --- figures ---
 
 

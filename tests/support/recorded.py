@@ -47,6 +47,9 @@ def recorded_game(row: Any, background: int = 2) -> GameTracks:
     time = np.arange(ends + 1) * STEP_S
     sides = {"ego": (row.ego_outcome, 12.5), "non_ego": (row.non_ego_outcome, 13.4 if touching else 14.4)}
     players = [_player(name, time, random, *each) for name, each in sides.items() if each[0]]
+    if len(players) == 1:
+        for nothing in ("leader_gap_m", "time_to_collision_s"):
+            players[0].columns[nothing][:] = np.inf
     along = [
         Track(name=f"car {n}", size_m=(5.0, 1.8), first_step=0, columns=_motion(time, 80.0 + 30.0 * n, -1.6, 9.0))
         for n in range(background)
@@ -62,6 +65,8 @@ def recorded_game(row: Any, background: int = 2) -> GameTracks:
         outcome=outcome,
         players=players,
         background=along,
+        severity=row.severity,
+        delta_v_mps=2.0 + row.episode / 10 if outcome == "collision" else None,
         reference=_reference(*players) if outcome == "collision" and row.episode == PREVENTED else None,
         touches=[(float(time[-1]), float(players[0].columns["x_m"][-1]), y_m[outcome])] if touching else [],
     )

@@ -81,6 +81,8 @@ def path_of(trace: pd.DataFrame, scene: OpenScene, game: Any) -> FailingPath:
         persona=game.persona,
         players={role: rows[["x_m", "y_m"]].to_numpy(float) for role, rows in players.items()},
         contact_m=(touches[-1].x_m, touches[-1].y_m) if touches else None,
+        seed=int(game.seed),
+        episode=int(game.episode),
     )
 
 
@@ -138,6 +140,8 @@ def tracks_of(trace: pd.DataFrame, scene: OpenScene, game: Any, takeover: pd.Dat
         step_s=scene.world.step_s,
         steps=int(trace["step"].max()),
         outcome=judged(game._asdict())[1],
+        severity=float(np.nan_to_num(game.severity)),
+        delta_v_mps=_delta_v_mps(game),
         players=players,
         background=[
             _track(name, piece, types[name], of_background)
@@ -148,6 +152,12 @@ def tracks_of(trace: pd.DataFrame, scene: OpenScene, game: Any, takeover: pd.Dat
         perceived=_perceived(trace, scene.world.roles[EGO]),
         touches=[(contact.time_s, contact.x_m, contact.y_m) for contact in contacts(trace, types, scene.rail_lines)],
     )
+
+
+def _delta_v_mps(game: Any) -> float | None:
+    """The greater change of velocity in the collision of a row of `episodes`; None without one."""
+    known = [each for each in (game.ego_delta_v_mps, game.other_delta_v_mps) if np.isfinite(each)]
+    return max(known, default=None)
 
 
 def _perceived(trace: pd.DataFrame, ego: str) -> list[tuple[int, list[str], int]]:
