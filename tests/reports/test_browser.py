@@ -106,4 +106,5 @@ def test_report__no_column_and_no_fold_is_cut_on_paper(opened):
         && (each.scrollWidth > each.clientWidth + 1 || each.scrollHeight > each.clientHeight + 1))
         .map(each => each.outerHTML.slice(0, 80))"""
     assert page.evaluate(cut) == []
+    assert page.locator(".clip:visible").count() == 0  # a drawing that plays is blank on paper
     assert page.evaluate("document.documentElement.scrollWidth") <= 700

@@ -15,7 +15,7 @@ from harness.reports.cards import STILL_DRIVES
 from harness.reports.learning import searches
 from harness.reports.provenance import rounds
 from harness.reports.run_tables import QUESTIONS, RECONFIGURED
-from tests.support.pages import Page, campaign, rendered
+from tests.support.pages import Page, campaign, plain, rendered
 
 PAYOFFS = (2.0, 1.5, math.nan, 4.25, 4.25)
 
@@ -58,7 +58,8 @@ def reconfigured(**options: Any) -> dict[str, Any]:
 def test_page__shows_naive_against_reconfigured_as_it_does_naive_against_retrained() -> None:
     parsed = Page(rendered(**reconfigured()))
     page = parsed.text
-    assert [cell["text"] for cell in parsed.tables["failure-table"][0]] == ["against", "ego adas", "reconfigured ego"]
+    headings, axis = parsed.tables["failure-table"][0], "0 30 % 60 %"
+    assert [plain(cell["text"]) for cell in headings] == ["against", f"ego adas{axis}", f"reconfigured ego{axis}"]
     assert f"{QUESTIONS['RQ2'].format(doing=RECONFIGURED.doing)} Yes RQ2: yes" in page
     assert "Reconfiguration reduces the ego's failures against the speedy driver from 18 of 60 games to 2 of 60" in page
     assert STILL_DRIVES.format(made="reconfigured") in page
