@@ -12,7 +12,7 @@ import numpy as np
 from harness.evaluation.comparisons.preventability import prevented_examples
 from harness.evaluation.competence import WITHHELD, Verdict
 from harness.evaluation.rule_book.causes import cause_lines
-from harness.evaluation.strategies import NAIVE_VS_SUMO, PAPER_ROUNDS, NaiveEgo, against_persona, round_of
+from harness.evaluation.strategies import PAPER_ROUNDS, NaiveEgo, against_persona, round_of
 from harness.reports.embedding import key
 from harness.reports.focus import Focus, focus_of
 from harness.reports.key_figures import egos_of
@@ -88,7 +88,7 @@ def _told(focus: Focus | None, personas: Sequence[str], tables: RunTables) -> It
 def _where(focus: Focus, tables: RunTables) -> str:
     if focus.persona:
         return f" against {focus.persona}"
-    return f" against an ordinary {tables.person}" if focus.arm == NAIVE_VS_SUMO.name else " alone"
+    return f" against an ordinary {tables.person}" if focus.is_ordinary else " alone"
 
 
 def _why(focus: Focus | None, tables: RunTables) -> Iterator[str]:

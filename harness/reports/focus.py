@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from harness.evaluation.comparisons.acceptance_checks import Check, worst_of_each
-from harness.evaluation.strategies import NAIVE_ALONE, NAIVE_VS_SUMO, against_persona
+from harness.evaluation.strategies import NaiveEgo, NonEgoStrategy, SumoNonEgo, against_persona
 from harness.reports.acceptance_wording import TITLES
 from harness.reports.run_tables import RunTables
 
@@ -26,26 +26,28 @@ class Focus:
     """How many of its games the ego failed."""
     check: Check | None = None
     """The broken bound for which it is chosen."""
+    is_ordinary: bool = False
+    """Whether an ordinary driver has the person's place."""
 
 
 def focus_of(tables: RunTables) -> Focus | None:
-    """The arm of the naive ego alone, or against an ordinary driver, if the ego fails in it; else that of the first
-    broken bound that was measured; else the one with the most failures among the last egos against their personas; else
-    among the naive ego's. None: no ego fails, and no measured bound is broken."""
+    """The arm of the naive or a last ego alone, or against an ordinary driver, if the ego fails in it; else that of the
+    first broken bound that was measured, of one with failures if there is any; else the one with the most failures
+    among the last egos against their personas; else among the naive ego's. None: no ego fails, and no measured bound is
+    broken."""
     return next(_candidates(tables), None)
 
 
 def _candidates(tables: RunTables) -> Iterator[Focus]:
-    ordinary = f"fails against an ordinary {tables.person}"
-    for arm, where in ((NAIVE_ALONE.name, "fails alone"), (NAIVE_VS_SUMO.name, ordinary)):
-        if failed := tables.counts_of(arm)[0]:
-            yield Focus(arm=arm, ego=tables.naive, persona="", happens=f"the {tables.naive} {where}", failed=failed)
-    for check in worst_of_each(tables.acceptance or ()):
-        if check.measured and not check.passed and len(tables.games_of(check.arm)):
-            happens = f"the ego breaks the bound on {TITLES[check.bound]} against {check.persona}"
-            failed, _ = tables.counts_of(check.arm)
-            yield Focus(arm=check.arm, ego="ego", persona=check.persona, happens=happens, failed=failed, check=check)
     changed = f"{tables.change.made} ego"
+    for ego, made in ((tables.naive, {NaiveEgo()}), (changed, {tables.last_ego(each) for each in tables.personas})):
+        for is_ordinary, where in ((False, "fails alone"), (True, f"fails against an ordinary {tables.person}")):
+            played = [name for name, arm in tables.arms.items() if arm.ego in made and _has(arm.non_ego, is_ordinary)]
+            failed, arm = max(((tables.counts_of(name)[0], name) for name in played), default=(0, ""))
+            if failed:
+                happens = f"the {ego} {where}"
+                yield Focus(arm=arm, ego=ego, persona="", happens=happens, failed=failed, is_ordinary=is_ordinary)
+    yield from sorted(_broken(tables), key=lambda each: not each.failed)
     last = [(against_persona(tables.last_ego(each), each).name, each) for each in tables.personas]
     naive = [(tables.arms_of("RQ1", each)[1], each) for each in tables.personas]
     for arms, ego, happens in (
@@ -58,3 +60,16 @@ def _candidates(tables: RunTables) -> Iterator[Focus]:
         if failed:
             words = happens.format(ego=ego, persona=persona)
             yield Focus(arm=arm, ego=ego, persona=persona, happens=words, failed=failed)
+
+
+def _has(non_ego: NonEgoStrategy | None, is_ordinary: bool) -> bool:
+    """Whether the person's place in an arm is an ordinary driver's, or else nobody's."""
+    return isinstance(non_ego, SumoNonEgo) if is_ordinary else non_ego is None
+
+
+def _broken(tables: RunTables) -> Iterator[Focus]:
+    for check in worst_of_each(tables.acceptance or ()):
+        if check.measured and not check.passed and len(tables.games_of(check.arm)):
+            happens = f"the ego breaks the bound on {TITLES[check.bound]} against {check.persona}"
+            failed, _ = tables.counts_of(check.arm)
+            yield Focus(arm=check.arm, ego="ego", persona=check.persona, happens=happens, failed=failed, check=check)

@@ -11,7 +11,7 @@ import pandas as pd
 from markupsafe import Markup
 
 from harness.evaluation.start_space import NEIGHBOURS, SCORES, best_pair, endings, explained_share
-from harness.evaluation.strategies import NAIVE_VS_SUMO, against_persona
+from harness.evaluation.strategies import against_persona
 from harness.evaluation.worst_first import worst_first
 from harness.game.arrays import FloatArray
 from harness.game.roles import MOST_PEOPLE, NON_EGO, roles_of
@@ -99,7 +99,7 @@ def _arms(tables: RunTables) -> list[_ShownArm]:
         found |= {arm: _ShownArm(name=arm, label=f"{ego} against {persona}", who=persona) for arm, ego in egos.items()}
     focus = focus_of(tables)
     if focus is not None and focus.arm not in found:
-        who = focus.persona or (ORDINARY if focus.arm == NAIVE_VS_SUMO.name else "")
+        who = focus.persona or (ORDINARY if focus.is_ordinary else "")
         label = f"{focus.ego} against {who}" if who else f"{focus.ego} alone"
         found[focus.arm] = _ShownArm(name=focus.arm, label=label, who=who)
     return sorted(found.values(), key=lambda arm: focus is None or arm.name != focus.arm)

@@ -154,6 +154,24 @@ def test_focus__is_first_the_ordinary_driver_then_the_broken_bound_then_the_last
     assert focus_of(run_of(failing=LAWFUL | {"naive": 0.0, "retrained": 0.0})) is None
 
 
+def test_focus__is_the_last_ego_too_that_fails_alone():
+    run = run_of(failing=LAWFUL)
+    run.summary.loc[run.summary["arm"] == "retrained_alone_speedy", ["failure_rate", "collisions"]] = (0.1, 6)
+    focus = focus_of(replace(run))
+    assert (focus.arm, focus.happens) == ("retrained_alone_speedy", "the retrained ego fails alone")
+
+
+def test_focus__is_of_the_broken_bounds_one_with_failures():
+    bounds = [broken("near_miss_rate", "retrained_vs_speedy"), broken("speed_loss_mps", "retrained_vs_distracted")]
+    bounds[1] = replace(bounds[1], persona="distracted")
+    run = run_of(personas=("speedy", "distracted"), acceptance=bounds)
+    assert focus_of(run).arm == "retrained_vs_speedy"
+    run.summary.loc[
+        run.summary["arm"] == "retrained_vs_speedy", ["failure_rate", "collisions", "rails", "timeouts"]
+    ] = 0.0
+    assert focus_of(replace(run)).arm == "retrained_vs_distracted"
+
+
 def test_next_step__is_the_worst_game_unless_a_player_of_it_did_not_learn():
     arguments = campaign(personas=["speedy", "distracted"], failing=LAWFUL)
     arguments["manifest"]["stages"]["distracted-seed1"]["stopped"] = DID_NOT_LEARN

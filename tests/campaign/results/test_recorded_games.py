@@ -27,6 +27,7 @@ def episodes(*rows):
     columns = ("arm", "episode", "ego_outcome")
     table = pd.DataFrame([dict(zip(columns, row, strict=True)) for row in rows])
     empty = {"persona": "", "seed": 1, "non_ego_outcome": "", "ego_min_ttc_s": np.nan, "error": ""}
+    empty |= {"ego_delta_v_mps": np.nan, "other_delta_v_mps": np.nan}
     severity = table["ego_outcome"].map({"collision": 300.0, "rail": 200.0})
     return table.assign(**empty, severity=severity)
 
