@@ -108,7 +108,7 @@ def _learning_figure(
             if entry.get("steps") is not None:
                 for axes in (payoff, failure):
                     axes.axvline(entry["steps"], color=INK, linewidth=1, linestyle=linestyle)
-        for event in {each for found in events.values() for each in found}:
+        for event in sorted({each for found in events.values() for each in found}):
             for axes in (payoff, failure):
                 axes.axvline(event.steps, color=INK, linewidth=0.8, linestyle=":")
         first = next(iter(entries.values()))
