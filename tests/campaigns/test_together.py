@@ -39,7 +39,10 @@ def test_campaign__each_persona_has_a_policy_and_a_card_of_its_own() -> None:
         assert f"| persona | `{name}` |" in (folder / "README.md").read_text()
         assert manifest["stages"][f"{name}-seed1"]["steps"] == manifest["stages"]["people-seed1"]["steps"]
     assert (read_policy(run / "policies" / "speedy-seed1").layers("actor")[0][1] != policy.layers("actor")[0][1]).any()
-    assert not (run / "policies" / "people-seed1" / "README.md").exists()
+    card = (run / "policies" / "people-seed1" / "README.md").read_text()
+    assert [line.split("|")[1].strip() for line in card.splitlines() if line.startswith("| `")] == [
+        f"`{name}`" for name in PERSONAS
+    ]
     assert set(pd.read_csv(run / "training.csv")["stage"]) == {"naive", "people", "robust"}
 
 

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import pandas as pd
+from jinja2 import Template
 
 from harness.campaign.plan.planned_drivers import Trained
 from harness.campaign.plan.stages import AssessmentStage
@@ -20,7 +21,7 @@ from harness.config.campaign import Campaign
 from harness.config.persona import Persona
 from harness.config.training import ATTENTIVE_SHARE
 from harness.evaluation.competence import DID_NOT_LEARN
-from harness.evaluation.strategies import NaiveEgo, strategy_name
+from harness.evaluation.strategies import NaiveEgo, against_persona, persona_alone, strategy_name
 from harness.files import write_atomically
 from harness.game.payoff_terms import GROUPS, TERMS
 from harness.game.roles import EGO, NON_EGO, ROLES
@@ -41,18 +42,41 @@ def write_model_cards(
     summary: pd.DataFrame,
     realism: pd.DataFrame,
 ) -> None:
-    """Write the card of every policy of `policies`, the policy.json of each stage that made one. A policy of several
-    personas has none: each of them has one. Nor has one that was learned in another run. `summary` and `realism` are
-    the run's tables of these names."""
-    stages = manifest["stages"]
-    of_one = {
-        stage: policy
-        for stage, policy in policies.items()
-        if "personas" not in policy and stages[policy.get("selected") or stage].get("steps") is not None
-    }
-    cards = {stage: model_card(stage, manifest, summary, realism, policy) for stage, policy in of_one.items()}
-    for stage, card in cards.items():
+    """Write the card of every policy of `policies`, the policy.json of each stage that made one. One that was learned
+    in another run has none. `summary` and `realism` are the run's tables of these names."""
+    for stage, policy in policies.items():
+        if manifest["stages"][policy.get("selected") or stage].get("steps") is None:
+            continue
+        if "personas" in policy:
+            card = card_of_many(stage, manifest, summary, policy)
+        else:
+            card = model_card(stage, manifest, summary, realism, policy)
         write_atomically(folder.policy(stage) / CARD, card.encode())
+
+
+def card_of_many(stage: str, manifest: Mapping[str, Any], summary: pd.DataFrame, policy: Mapping[str, Any]) -> str:
+    """The card of the network of several personas; the arguments are those of `model_card`. Each persona's own policy,
+    which is derived from it, has a card of its own."""
+    entry = manifest["stages"][stage]
+    rows = {row["arm"]: row for row in summary[summary["seed"] == entry["seed"]].to_dict("records")}
+    personas = list(policy["personas"])
+    figures = []
+    for persona in personas:
+        alone, naive = rows.get(persona_alone(persona).name), rows.get(against_persona(NaiveEgo(), persona).name)
+        goals = [_cells(row, is_ego=False)[1] if row else "" for row in (alone, naive)]
+        figures.append((persona, [*goals, _cells(naive, is_ego=True)[1] if naive else ""]))
+    text = _template("card_of_many").render(
+        stage=stage,
+        campaign=manifest["name"],
+        version=manifest["versions"]["harness"],
+        quick=manifest["quick"],
+        not_learned=stopped(entry) if entry["stopped"] == DID_NOT_LEARN else "",
+        facts=list(_training_facts(entry, manifest, policy)),
+        figures=figures,
+        settings=_settings(policy),
+        versions=_versions(manifest),
+    )
+    return text.strip() + "\n"
 
 
 def model_card(
@@ -64,16 +88,13 @@ def model_card(
     document = manifest["ego_persona"] if is_ego else manifest["persona_documents"][entry["persona"]]
     persona = Persona.from_record(document)
     profile = persona_profile(persona)
-    versions = manifest["versions"]
-    environment = environment_of("campaign/results", autoescape=False)
-    environment.filters["one_line"] = _one_line
-    text = environment.get_template("model_card.md.jinja").render(
+    text = _template("model_card").render(
         stage=stage,
         is_ego=is_ego,
         entry=entry,
         policy=policy,
         campaign=manifest["name"],
-        version=versions["harness"],
+        version=manifest["versions"]["harness"],
         quick=manifest["quick"],
         not_learned=stopped(entry) if entry["stopped"] == DID_NOT_LEARN else "",
         facts=list(_facts(entry, manifest, policy, persona)),
@@ -84,10 +105,25 @@ def model_card(
         sources=persona.sources,
         figures=list(_figures(stage, manifest, summary, is_ego)),
         crashes="" if is_ego else crashes_alone(realism, entry["name"], entry["seed"]),
-        settings=[(name, _shown(value)) for name, value in policy["training"].items()],
-        versions=", ".join(f"{name} {versions[name]}" for name in _PROGRAMS if name in versions),
+        settings=_settings(policy),
+        versions=_versions(manifest),
     )
     return text.strip() + "\n"
+
+
+def _template(name: str) -> Template:
+    environment = environment_of("campaign/results", autoescape=False)
+    environment.filters["one_line"] = _one_line
+    return environment.get_template(f"{name}.md.jinja")
+
+
+def _settings(policy: Mapping[str, Any]) -> list[tuple[str, str]]:
+    return [(name, _shown(value)) for name, value in policy["training"].items()]
+
+
+def _versions(manifest: Mapping[str, Any]) -> str:
+    versions = manifest["versions"]
+    return ", ".join(f"{name} {versions[name]}" for name in _PROGRAMS if name in versions)
 
 
 def _one_line(text: str) -> str:
@@ -98,8 +134,6 @@ def _one_line(text: str) -> str:
 def _facts(
     entry: Mapping[str, Any], manifest: Mapping[str, Any], policy: Mapping[str, Any], persona: Persona
 ) -> Iterator[tuple[str, str]]:
-    campaign = Campaign.model_validate(manifest["campaign"], strict=False)
-    against = policy["against"]
     yield "player", policy["player"]
     if policy.get("selected"):
         yield "the same policy as", f"`{policy['selected']}`, chosen by a selection (`selections.csv`)"
@@ -107,6 +141,16 @@ def _facts(
     if policy.get("learned_in"):
         personas = ", ".join(f"`{each}`" for each in policy["learned_with"])
         yield "learned in", f"`{policy['learned_in']}`, one network of {personas}"
+    yield from _training_facts(entry, manifest, policy)
+    if persona.attention is not None and policy["player"] == ROLES[NON_EGO]:
+        yield "no lapses in", f"the first {percent(ATTENTIVE_SHARE)} of the budget"
+
+
+def _training_facts(
+    entry: Mapping[str, Any], manifest: Mapping[str, Any], policy: Mapping[str, Any]
+) -> Iterator[tuple[str, str]]:
+    campaign = Campaign.model_validate(manifest["campaign"], strict=False)
+    against = policy["against"]
     yield "scene", f"`{policy['scene']}`"
     if roads := policy.get("roads"):
         yield "and in equal parts on the roads", ", ".join(f"`{each}`" for each in roads)
@@ -123,8 +167,6 @@ def _facts(
     if entry.get("rule"):
         yield "convergence", entry["rule"]
     yield "training seed", str(entry["seed"])
-    if persona.attention is not None and policy["player"] == ROLES[NON_EGO]:
-        yield "no lapses in", f"the first {percent(ATTENTIVE_SHARE)} of the budget"
 
 
 def _beginning(settings: Mapping[str, Any]) -> str:
