@@ -13,6 +13,7 @@ import json
 import shutil
 import sys
 import tempfile
+from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Literal
@@ -108,4 +109,10 @@ def _table(folder: Path, name: str) -> pd.DataFrame:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), sys.argv[2:])
+    parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="where the pictures go")
+    parser.add_argument("runs", nargs="*", metavar="RUN", help="the name of a published run; without one: all of them")
+    arguments = parser.parse_args()
+    if unknown := sorted({*arguments.runs} - {*published()}):
+        parser.error(f"not published: {', '.join(unknown)}; there are {', '.join(published())}")
+    main(arguments.folder, arguments.runs)

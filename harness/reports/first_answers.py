@@ -70,7 +70,7 @@ def first_answers(tables: RunTables, steps: Sequence[NextStep]) -> list[FirstAns
 
 
 Told = tuple[str, Mapping[str, str]]
-"""Whom egos meet, as in " against speedy", and the egos by their arms."""
+"""The opponent in words, as in " against speedy", and the egos by their arms."""
 
 
 def _told(focus: Focus | None, personas: Sequence[str], tables: RunTables) -> Iterator[Told]:
