@@ -1,8 +1,9 @@
 """Assessment of one arm: its seeded games as records and traces.
 
-Episode k has the same initial state in every arm of every training seed. Where SUMO drives a vehicle, SUMO is reloaded
-for each game with a seed that depends on the episode only, because the games of one simulation share SUMO's random
-numbers. Games in which SUMO drives none are played side by side in one simulation; the bytes are the same.
+Episode k has the same initial state in every arm of every training seed. Where a driver of SUMO's draws random numbers,
+SUMO is reloaded for each game with a seed that depends on the episode only, because the games of one simulation share
+them. Games in which SUMO drives nothing, or only the car that follows the ego, are played side by side in one
+simulation; the bytes are the same.
 """
 
 from __future__ import annotations
@@ -30,7 +31,6 @@ from harness.evaluation.measured_game import measured
 from harness.evaluation.recorded_game import RecordedGame
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.outcome import Outcome
-from harness.game.roles import EGO
 from harness.game.seeding import generator_of, parts_of
 from harness.road.demand.route_file import Departure
 from harness.road.scene.open_scene import OpenScene
@@ -87,9 +87,8 @@ def assess_batches(
     """Play batches of episodes, in their order. A game that can't be played, or that has impossible numbers, is a
     record with outcome `error`.
 
-    The games of a batch are the same bytes as games alone. Those in which SUMO drives no vehicle are played side by
-    side, if their drivers can: they need no random numbers of SUMO. If anything goes wrong among them, each is played
-    again alone.
+    The games of a batch are the same bytes as games alone. They are played side by side if they need no random numbers
+    of SUMO and their drivers can. If anything goes wrong among them, each is played again alone.
 
     `on_start` gets each episode number before that game is played. Episodes in `abandoned` are not played; their record
     has the reason as its error. `start_from` may change the start that is drawn for a game.
@@ -144,9 +143,7 @@ class _Rollout:
         """Play those of the games that can be played side by side. None if one of them ends with an error."""
         if self._apart is None or len(episodes) < 2:
             return {}
-        starts = {episode: start for episode in episodes if not self._is_followed(start := self._start(episode))}
-        if len(starts) < 2:
-            return {}
+        starts = {episode: self._start(episode) for episode in episodes}
         self._close_alone()
         for episode in starts:
             self._on_start(episode)
@@ -197,10 +194,6 @@ class _Rollout:
 
     def _departures(self, episode: int) -> list[Departure]:
         return self._arm.scene.departures(generator_of(*parts_of(self._arm.seed, episode), "others"))
-
-    def _is_followed(self, start: InitialState) -> bool:
-        scene = self._arm.scene
-        return scene.road_behind.follower(start, float(scene.world.length_m[EGO])) is not None
 
     def _open_alone(self) -> Arena:
         if self._alone is None:

@@ -35,7 +35,8 @@ class LoadedSumo:
             raise SimulationError("this process has a libsumo simulation already")
         scenes = [part.scene for part in parts]
         self._scenes = " and ".join(dict.fromkeys(repr(scene.document.name) for scene in scenes))
-        tiles = tiles_of([Copies(part.scene.net_file, part.games, part.scene.junctions) for part in parts])
+        copies = [Copies(part.scene.net_file, part.games, part.scene.junctions) for part in parts]
+        tiles = tiles_of(copies, in_one_place=all(part.in_one_place for part in parts))
         folder = tempfile.TemporaryDirectory(prefix="harness-sumo-")
         names, files = _write_types(scenes, Path(folder.name))
         self.tiles = [

@@ -27,6 +27,12 @@ class SceneGames:
         return all(self.taken_over) and not self.scene.has_background_traffic
 
     @property
+    def in_one_place(self) -> bool:
+        """Whether the tiles of an assessment lie on each other, so that what SUMO computes in a game is the same, to
+        the last bit, in every tile. It looks for lanes along the routes of a car then, which are in its tile."""
+        return self.recorded and self.alone
+
+    @property
     def options(self) -> list[str]:
         """SUMO's options, besides the names of files and the seed."""
         # SUMO 1.28 may crash (SIGSEGV) if a placed car leaves a junction's lanes and lane changes take time: they take

@@ -186,8 +186,9 @@ def _segment(
     )
     model.num_timesteps = progress.steps
     model._last_obs = None  # SB3 then resets the games
+    updates = max(1, CURVE_WINDOW_STEPS // spec.settings.buffer)  # a point in TensorBoard for each of the curve's
     try:
-        model.learn(steps, callback=curve, reset_num_timesteps=False)
+        model.learn(steps, callback=curve, log_interval=updates, reset_num_timesteps=False)
     except FloatingPointError as error:
         raise FloatingPointError(f"{error}, after {model.num_timesteps} steps") from error
     for name, value in model.policy.state_dict().items():

@@ -108,13 +108,17 @@ def side_by_side(assessed: SeatedArm, *batches: list[int]) -> list[str]:
     return [repr((game.played, game.trace)) for game in assess_batches(assessed, batches)]
 
 
-@pytest.mark.parametrize(("scene", "judged"), [("paper_merge", True), ("red_light", False), ("zebra", False)])
-def test_batch__has_the_bytes_of_games_alone(scene: str, judged: bool) -> None:
-    """Nobody follows the ego on paper_merge; elsewhere half of the games have a follower, and are played alone."""
+@pytest.mark.parametrize(
+    ("scene", "judged", "followed"),
+    [("paper_merge", True, False), ("merge", True, True), ("red_light", False, True), ("zebra", False, False)],
+)
+def test_batch__has_the_bytes_of_games_alone(scene: str, judged: bool, followed: bool) -> None:
+    """SUMO drives the car that follows the ego in a part of the games. It draws no random numbers."""
     opened = open_scene(scene)
     ego = reference_driver(UPPER_BOUND, car_of(opened.world, 0), 3.5) if judged else RANDOM
     assessed = arm(opened, ego, RANDOM, persona=TEXTING)
     alone = side_by_side(assessed, *([episode] for episode in range(5)))
+    assert any("'follower'" in game for game in alone) == followed
     assert side_by_side(assessed, [0, 1, 2], [4, 3]) == [*alone[:3], alone[4], alone[3]]
 
 
@@ -137,9 +141,10 @@ def test_batch__has_the_bytes_of_games_alone_with_perception_errors() -> None:
     assert any(others)  # a game may end before an error matters
 
 
-def test_batch__of_more_games_than_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A tile plays one game after the other, and stands still at the end."""
-    assessed = arm(open_scene("paper_merge"), RANDOM, RANDOM)
+@pytest.mark.parametrize("scene", ["paper_merge", "merge"])
+def test_batch__of_more_games_than_tiles(scene: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A tile plays one game after the other, with a follower or without, and stands still at the end."""
+    assessed = arm(open_scene(scene), RANDOM, RANDOM)
     alone = side_by_side(assessed, *([episode] for episode in range(7)))
     monkeypatch.setattr("harness.assessment.rollout.SIDE_BY_SIDE", 2)
     assert side_by_side(assessed, [*range(7)]) == alone

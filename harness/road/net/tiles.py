@@ -198,8 +198,9 @@ class Copies(NamedTuple):
     junctions: frozenset[str] | None = None
 
 
-def tiles_of(nets: Sequence[Copies]) -> list[list[Tile]]:
-    """The tiles of each net, from south to north with room between them. A single one is the net as it is."""
+def tiles_of(nets: Sequence[Copies], *, in_one_place: bool = False) -> list[list[Tile]]:
+    """The tiles of each net, from south to north with room between them, or all in one place. A single one is the net
+    as it is."""
     games = sum(each.games for each in nets)
     tiles: list[list[Tile]] = []
     south_m: float | None = None  # of the next tile's southern end
@@ -207,8 +208,9 @@ def tiles_of(nets: Sequence[Copies]) -> list[list[Tile]]:
         location = parse_xml(net.net_file).find("location")
         corners = "0,0,0,0" if location is None or games == 1 else location.get("convBoundary", "0,0,0,0")
         _, low, _, high = (float(each) for each in corners.split(","))
-        between_m = float(round(high - low + _GAP_M)) if location is not None and games > 1 else 0.0
-        first_m = 0.0 if south_m is None else float(ceil(south_m - low))
+        apart = location is not None and games > 1 and not in_one_place
+        between_m = float(round(high - low + _GAP_M)) if apart else 0.0
+        first_m = 0.0 if south_m is None or in_one_place else float(ceil(south_m - low))
         names = [f"g{sum(map(len, tiles)) + k}_" if games > 1 else "" for k in range(net.games)]
         offsets = [first_m + between_m * k for k in range(net.games)]
         tiles.append(
