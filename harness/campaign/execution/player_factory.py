@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.assessment.rollout import assess
+from harness.assessment.rollout import assess_batches
 from harness.assessment.seated_arm import SeatedArm
 from harness.campaign.execution.mixture_weights import equilibrium_of
 from harness.campaign.execution.stage_run import RunContext
@@ -100,7 +100,7 @@ class PlayerFactory:
             sides = [*stage.sides]
             sides[learner] = (member,)
             candidates.append(replace(stage, ego=sides[0], non_ego=sides[1]))
-            payoffs = (game.payoff_of(learner) for game in assess(self.arm(candidates[-1]), games))
+            payoffs = (game.payoff_of(learner) for game in assess_batches(self.arm(candidates[-1]), [games]))
             measured = [payoff for payoff in payoffs if np.isfinite(payoff)]
             if not measured:
                 raise StageFailed(f"{stage.id}: none of the games that choose the best response could be played")

@@ -154,8 +154,7 @@ def _from_start(
             outcomes = {}
             driver = reference_driver(name, car_of(scene.world, EGO), lane_width_of(scene.world))
             drivers = (mixture_of(driver, run.context.ego_persona), *seatless.drivers[1:])
-            batches = [episodes] if run.attempt.first else [[episode] for episode in episodes]
-            judged = replace(seatless, drivers=drivers)
+            batches, judged = run.attempt.batches(episodes), replace(seatless, drivers=drivers)
             for game in assess_batches(judged, batches, run.on_start, run.attempt.abandoned):
                 record = game.record
                 outcomes[record["episode"]] = {"outcome": outcome_of(record), "error": str(record["error"])}

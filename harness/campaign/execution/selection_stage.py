@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.assessment.rollout import assess
+from harness.assessment.rollout import assess_batches
 from harness.assessment.seated_arm import SeatedArm
 from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import StageRun
@@ -72,7 +72,8 @@ def _played(stage: SelectionStage, run: StageRun, players: PlayerFactory) -> Can
             opponent = () if is_alone else stage.opponent
             arm = _arm(stage, players, (candidate,), opponent)
             asked = [episode for episode, without in zip(episodes, alone.tolist(), strict=True) if without == is_alone]
-            for game in assess(arm, asked, run.on_start, run.attempt.abandoned):
+            batches = run.attempt.batches(asked)
+            for game in assess_batches(arm, batches, run.on_start, run.attempt.abandoned):
                 place = game.played["episode"] - episodes.start
                 payoffs[k, place] = game.payoff_of(stage.learner)
                 failed[k, place] = game.played[f"{role}_outcome"] != goal

@@ -12,7 +12,7 @@ import os
 import tempfile
 import time
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -136,6 +136,10 @@ class Attempt:
     """The first attempt plays again the games that could not be played in an earlier run of the command."""
     abandoned: Mapping[int, str] = field(default_factory=dict)
     """Episodes that crashed their worker too often, each with the reason."""
+
+    def batches(self, episodes: Sequence[int]) -> list[Sequence[int]]:
+        """Episodes as one batch. After a crash each is played alone, so that its place is known."""
+        return [episodes] if self.first else [[episode] for episode in episodes]
 
 
 @dataclass(frozen=True, kw_only=True)
