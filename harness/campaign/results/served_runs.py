@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import datetime, timezone
 from pathlib import Path
 from threading import Lock
@@ -17,7 +18,7 @@ from harness.campaign.storage.run_folder import MANIFEST, RunFolder
 from harness.campaign.storage.training_curves import CHECKPOINT, curves_so_far
 from harness.config.campaign import Campaign
 from harness.errors import UsageError
-from harness.reports.index_page import render_index
+from harness.reports.index_page import history_of, render_index
 from harness.reports.learning import learning
 from harness.reports.run_tables import RunTables
 from harness.reports.running_page import RunningStage, render_running
@@ -39,8 +40,10 @@ class ServedRuns:
             search = parse_qs(parts.query).get("search", [""])[0]
             return PAGE, render_index(str(self._folder), runs_in(self._folder), search).encode()
         if first == "compare" and len(rest) > 1 and all(map(self._is_run, rest)):
-            addresses = [f"/{quote(name)}/" if (self._folder / name / "report.html").is_file() else "" for name in rest]
-            return PAGE, compare_runs([self._folder / name for name in rest], addresses).page().encode()
+            return self._comparison(rest)
+        if first == "history" and len(rest) == 1 and self._is_run(rest[0]):
+            of_ego = history_of(indexed_run(self._folder / rest[0]), runs_in(self._folder))
+            return self._comparison([run.folder.name for run in of_ego]) if len(of_ego) > 1 else None
         if not rest or not self._is_run(first):
             return None
         run, below = self._folder / first, parts.path.removeprefix("/").partition("/")[2]
@@ -50,6 +53,10 @@ class ServedRuns:
         if not has_report(run):
             return (PAGE, running_page(run).encode()) if not below else None
         return self._report(first).answer(f"/{below}")
+
+    def _comparison(self, names: Sequence[str]) -> tuple[str, bytes]:
+        addresses = [f"/{quote(name)}/" if (self._folder / name / "report.html").is_file() else "" for name in names]
+        return PAGE, compare_runs([self._folder / name for name in names], addresses).page().encode()
 
     def _is_run(self, name: str) -> bool:
         return name in {file.parent.name for file in self._folder.glob(f"*/{MANIFEST}")}

@@ -35,7 +35,7 @@ from harness.campaign.storage.locks import InUse, only_one, wait_for_workers
 from harness.campaign.storage.manifest import RUN_AGAIN, StageEntry, checksum_of_content, read_manifest
 from harness.campaign.storage.run_log import LOG, run_log
 from harness.errors import Problem, UsageError
-from harness.files import content_of, drop_scratch, has_digest, leads_out, make_folder, write_atomically
+from harness.files import content_of, drop_scratch, has_digest, leads_out, links_in, make_folder, write_atomically
 
 MANIFEST = "manifest.json"
 JUDGED, TAKEN_OVER, SELECTED = "reference_drivers.csv", "takeovers.csv", "selections.csv"
@@ -175,7 +175,16 @@ class RunFolder:
     # --- the manifest --------------------------------------------------------------------------------------------
 
     def manifest(self) -> dict[str, Any]:
-        """The manifest. Raises UsageError if the folder has none that can be read."""
+        """The manifest. Raises UsageError if the folder has none that can be read, or has a link that leads out."""
+        manifest = self.manifest_alone()
+        for place in links_in(self.path):
+            self.check_link(place)
+        return manifest
+
+    def manifest_alone(self) -> dict[str, Any]:
+        """The manifest, for a reader of no other file, or of files that it checks by `check_link`. Raises UsageError if
+        the folder has none that can be read."""
+        self.check_link(self.manifest_file)
         try:
             content = content_of(self.manifest_file, _MOST_MANIFEST_BYTES)
         except (FileNotFoundError, NotADirectoryError):
@@ -183,13 +192,13 @@ class RunFolder:
             raise UsageError.of(self.path, "", message, "name the folder a campaign wrote") from None
         except OSError as error:
             raise UsageError.of(self.manifest_file, "", f"is damaged: {error.strerror}", RUN_AGAIN) from None
-        manifest = read_manifest(self.manifest_file, content)
-        for folder, folders, files in os.walk(self.path):
-            for place in (Path(folder) / name for name in (*folders, *files)):
-                if place.is_symlink() and leads_out(place, self.path):  # what it points to is not the run's
-                    message = "is a link that leads out of the run folder"
-                    raise UsageError.of(place, "", message, "put there what it points to")
-        return manifest
+        return read_manifest(self.manifest_file, content)
+
+    def check_link(self, place: Path) -> None:
+        """Raises UsageError for a link that leads out of the folder: what it points to is not the run's."""
+        if place.is_symlink() and leads_out(place, self.path):
+            message = "is a link that leads out of the run folder"
+            raise UsageError.of(place, "", message, "put there what it points to")
 
     def check_whole(self, manifest: Mapping[str, Any]) -> None:
         """Raises UsageError where files of the stages are missing, as in a folder that was published without them, or
