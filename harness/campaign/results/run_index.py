@@ -42,7 +42,7 @@ def indexed_run(path: Path) -> IndexedRun:
 
 
 def _read(folder: RunFolder) -> IndexedRun:
-    manifest = folder.manifest_alone()
+    manifest = folder.listed_manifest()
     summary, result, log = (folder.path / name for name in ("summary.csv", RESULT, LOG))
     for file in (summary, result, log):
         folder.check_link(file)

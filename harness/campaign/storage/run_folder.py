@@ -32,7 +32,14 @@ from typing import Any
 from harness.campaign.plan.stages import stage_id
 from harness.campaign.storage.checksums import mismatches, read_checksums, write_checksums
 from harness.campaign.storage.locks import InUse, only_one, wait_for_workers
-from harness.campaign.storage.manifest import RUN_AGAIN, StageEntry, checksum_of_content, read_manifest
+from harness.campaign.storage.manifest import (
+    RUN_AGAIN,
+    ListedManifest,
+    Manifest,
+    StageEntry,
+    checksum_of_content,
+    read_manifest,
+)
 from harness.campaign.storage.run_log import LOG, run_log
 from harness.errors import Problem, UsageError
 from harness.files import content_of, drop_scratch, has_digest, leads_out, links_in, make_folder, write_atomically
@@ -176,14 +183,17 @@ class RunFolder:
 
     def manifest(self) -> dict[str, Any]:
         """The manifest. Raises UsageError if the folder has none that can be read, or has a link that leads out."""
-        manifest = self.manifest_alone()
+        manifest = self._manifest(Manifest)
         for place in links_in(self.path):
             self.check_link(place)
         return manifest
 
-    def manifest_alone(self) -> dict[str, Any]:
-        """The manifest, for a reader of no other file, or of files that it checks by `check_link`. Raises UsageError if
-        the folder has none that can be read."""
+    def listed_manifest(self) -> dict[str, Any]:
+        """The manifest, checked as far as a list of runs reads it (`ListedManifest`); other files are not looked at.
+        Raises UsageError if the folder has none that can be read."""
+        return self._manifest(ListedManifest)
+
+    def _manifest(self, form: type[Manifest] | type[ListedManifest]) -> dict[str, Any]:
         self.check_link(self.manifest_file)
         try:
             content = content_of(self.manifest_file, _MOST_MANIFEST_BYTES)
@@ -192,7 +202,7 @@ class RunFolder:
             raise UsageError.of(self.path, "", message, "name the folder a campaign wrote") from None
         except OSError as error:
             raise UsageError.of(self.manifest_file, "", f"is damaged: {error.strerror}", RUN_AGAIN) from None
-        return read_manifest(self.manifest_file, content)
+        return read_manifest(self.manifest_file, content, form)
 
     def check_link(self, place: Path) -> None:
         """Raises UsageError for a link that leads out of the folder: what it points to is not the run's."""

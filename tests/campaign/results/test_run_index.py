@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import time
+import subprocess
+import sys
 import urllib.error
 from collections.abc import Iterator
 from datetime import datetime, timedelta, timezone
@@ -24,7 +25,6 @@ from harness.campaign.storage.training_curves import CHECKPOINT
 from harness.errors import UsageError
 from harness.evaluation.strategies import NaiveEgo, is_named_of_a_trait, is_named_of_the_naive_ego
 from harness.evaluation.tables import read_csv
-from harness.reports.index_page import render_index
 from tests.support.pages import Page
 from tests.support.repository import REPOSITORY
 from tests.support.serving import read, serving
@@ -214,18 +214,32 @@ def test_index__finds_the_worst_arms_by_their_names_as_the_plan_has_them(name: s
             assert (cell.failures, cell.games) == (failed[cell.arm], played[cell.arm])
 
 
+OPEN_INDEX = """
+import sys, time
+from pathlib import Path
+from harness.campaign.results.run_index import runs_in
+from harness.reports.index_page import render_index
+for _ in range(2):
+    begun = time.process_time()
+    page = render_index("reports", runs_in(Path(sys.argv[1])))
+    print(time.process_time() - begun, len(page), "200 of 200 runs" in page)
+"""
+
+
 def test_index__of_200_runs_takes_a_second_of_processor_time(tmp_path: Path) -> None:
-    """Copies of the published runs, in turn; the first time, with everything that the first use of a library costs."""
+    """Copies of the published runs, in turn; the first time in a process, with all that it loads then, and later."""
     for number, manifest in zip(range(200), cycle(PUBLISHED), strict=False):
         run = tmp_path / f"run{number}"
         run.mkdir()
         for name in ("manifest.json", "summary.csv", "result.json"):
             shutil.copy(manifest.parent / name, run / name)
-    begun = time.process_time()
-    page = render_index("reports", runs_in(tmp_path))
-    assert_work(time.process_time() - begun, 1.0)
-    assert "200 of 200 runs" in page
-    assert len(page) < 500_000
+    command = [sys.executable, "-c", OPEN_INDEX, str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=600.0)
+    for line in done.stdout.splitlines():
+        took_s, size, has_all = line.split()
+        assert_work(float(took_s), 1.0)
+        assert int(size) < 200_000
+        assert has_all == "True"
 
 
 def test_index__does_not_look_at_the_other_files_of_a_run(tmp_path: Path) -> None:
