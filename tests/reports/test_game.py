@@ -107,6 +107,13 @@ def test_heat_map__has_a_personas_strategies_side_by_side(found):
     assert names == ["speedy", "speedy_round2", "distracted", "sumo"]
 
 
+def drawn_with(style: str, figure: str) -> int:
+    """The number of shapes of a figure with a style, by their class or by themselves."""
+    rules = dict(re.findall(r"\.([a-z]+){([^}]*)}", figure))
+    of_class = [name for name in re.findall(r'class="([a-z]+)"', figure) if style in rules.get(name, "").split(";")]
+    return len(of_class) + sum(style in each.split(";") for each in re.findall(r'style="([^"]*)"', figure))
+
+
 def test_heat_map__frames_what_an_equilibrium_plays(found):
     solved = found.equilibria[(found.equilibria["seed"] == 2) & (found.equilibria["number"] == 1)]
     players = solved[(solved["solution"] == "nash") & (solved["share"] > 0.001)].groupby(["game", "role"])["player"]
@@ -120,7 +127,7 @@ def test_heat_map__frames_what_an_equilibrium_plays(found):
     (mean, _, second) = game_section(found, NO_LINKS)["views"]
     for each in second["maps"]:
         assert set(re.search(r"In equilibrium: ([^\"]*)", each["figure"])[1].split("; ")) == pairs
-        assert each["figure"].count("stroke-width: 1.6") == len(pairs)
+        assert drawn_with("stroke-width:1.6", each["figure"]) == len(pairs)
         assert IN_EQUILIBRIUM in each["caption"]
     assert all("In equilibrium" not in each["figure"] + each["caption"] for each in mean["maps"])
 
