@@ -69,6 +69,7 @@ class IndexedRun:
     last: WorstCell | None = None
     """Of the egos that are not naive."""
     has_page: bool = False
+    """Whether `harness serve` shows the page of the run."""
 
     def matches(self, text: str) -> bool:
         """Whether name, ego, scene or a persona contains a text, in any case."""

@@ -17,7 +17,7 @@ from harness.reports.game_links import GameLinks
 from harness.reports.heatmaps import IN_EQUILIBRIUM, OPENS_A_GAME, views
 from tests.support.chromium import COLOURS, contrast, rgb, unfold
 from tests.support.game_tables import findings
-from tests.support.pages import Page, campaign, plain, rendered
+from tests.support.pages import Page, campaign, drawn_with, plain, rendered
 
 NO_LINKS = GameLinks(embedded=(), episodes=table_of("episodes"))
 
@@ -105,13 +105,6 @@ def test_heat_map__has_a_personas_strategies_side_by_side(found):
     figure = views(rows, found.equilibria, NO_LINKS)[0]["maps"][0]["figure"]
     names = re.findall(r">(speedy|speedy_round2|distracted|sumo)</text>", figure)
     assert names == ["speedy", "speedy_round2", "distracted", "sumo"]
-
-
-def drawn_with(style: str, figure: str) -> int:
-    """The number of shapes of a figure with a style, by their class or by themselves."""
-    rules = dict(re.findall(r"\.([a-z]+){([^}]*)}", figure))
-    of_class = [name for name in re.findall(r'class="([a-z]+)"', figure) if style in rules.get(name, "").split(";")]
-    return len(of_class) + sum(style in each.split(";") for each in re.findall(r'style="([^"]*)"', figure))
 
 
 def test_heat_map__frames_what_an_equilibrium_plays(found):

@@ -48,7 +48,6 @@ def _read(folder: RunFolder) -> IndexedRun:
         folder.check_link(file)
     entries: Mapping[str, Mapping[str, Any]] = manifest["stages"]
     done = [name for name, entry in entries.items() if entry["status"] in FINISHED]
-    has_page = (folder.path / "report.html").is_file()
     has_ended = len(done) == len(entries) and summary.is_file()
     held = not has_ended and is_held(folder.lock)
     begun = _log_of(log) if held else []
@@ -71,8 +70,13 @@ def _read(folder: RunFolder) -> IndexedRun:
         accepted=_accepted(result) if has_ended else None,
         naive=naive,
         last=last,
-        has_page=has_page,
+        has_page=has_page(folder.path),
     )
+
+
+def has_page(path: Path) -> bool:
+    """Whether a run has a page: of a published one without a page, `harness serve` makes it from the tables."""
+    return (path / "report.html").is_file() or RunFolder(path).is_published
 
 
 def _accepted(file: Path) -> bool | None:

@@ -224,7 +224,8 @@ class RunFolder:
         """Raises UsageError for a published folder."""
         if self.is_published:
             message = "holds a report and its tables, but not the files that they are made from"
-            remedy = f"read its report.html, or play the games: run campaign {manifest['name']!r} again"
+            see = f"see its page (report.html, or harness serve {self.path})"
+            remedy = f"{see}, or play the games: run campaign {manifest['name']!r} again"
             raise UsageError.of(self.path, "", message, remedy)
 
     def check_games(self, arm: str, seed: int) -> None:
