@@ -19,7 +19,7 @@ from harness.evaluation.tables import read_csv, table_of
 from harness.files import has_digest
 from harness.reports.page import render_page
 from harness.reports.run_tables import RunTables
-from harness.road.scene.open_scene import OpenScene, open_scene
+from harness.road.scene.open_scene import open_scene
 from harness.shipped_documents import shipped
 
 _ALWAYS = ("episodes", "summary", "comparisons", "training")
@@ -61,11 +61,7 @@ def published_tables(folder: RunFolder) -> RunTables:
         is_from_tables=True,
         **frames,
     )
-    scene = _scene_of(campaign, manifest)
-    if scene is not None:
-        drives = all(each.drives for each in scene.document.players[1:])
-        starts = drawn_starts(scene, campaign.start_seed, tables.episodes["episode"])
-        tables = replace(tables, non_ego_drives=drives, starts=starts)
+    tables = _with_scene(tables, campaign)
     tables = replace(tables, game=_game(folder, campaign, tables))
     acceptance = campaign.acceptance
     if acceptance is None:
@@ -86,12 +82,19 @@ def _is_there(folder: Path, name: str) -> bool:
     return any((folder / f"{name}.csv{suffix}").is_file() for suffix in ("", ".gz"))
 
 
-def _scene_of(campaign: Campaign, manifest: Any) -> OpenScene | None:
-    """The scene of the run, if it is a shipped one as it was then; the run's own copy is not published."""
+def _with_scene(tables: RunTables, campaign: Campaign) -> RunTables:
+    """The tables with what the scene tells. The run's own copy is not published, but the scene may be a shipped one. It
+    tells the starts only if it is as it was then."""
     folder = shipped("networks") / Path(campaign.scene).name
-    digests = manifest["hashes"].values()
-    files = [each for each in folder.glob("*") if each.suffix in (".toml", ".xml")]
-    return open_scene(folder) if files and all(has_digest(each, digests) for each in files) else None
+    if not folder.is_dir():
+        return tables
+    scene = open_scene(folder)
+    tables = replace(tables, non_ego_drives=all(each.drives for each in scene.document.players[1:]))
+    files = {Path(file): digest for file, digest in tables.manifest["hashes"].items()}
+    digests = {file.name: digest for file, digest in files.items() if file.parent.name == folder.name}
+    if not (digests and all(has_digest(folder / name, [digest]) for name, digest in digests.items())):
+        return tables
+    return replace(tables, starts=drawn_starts(scene, campaign.start_seed, tables.episodes["episode"]))
 
 
 def _game(folder: RunFolder, campaign: Campaign, tables: RunTables) -> GameFindings | None:
