@@ -143,5 +143,19 @@ def leads_out(path: Path, folder: Path) -> bool:
     return not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder))
 
 
+def links_in(folder: str | Path) -> Iterator[Path]:
+    """The symbolic links in a folder and its subfolders, those to folders not followed. A folder that can't be read has
+    none."""
+    try:
+        entries = list(os.scandir(folder))
+    except OSError:
+        return
+    for entry in entries:
+        if entry.is_symlink():  # as the folder says: nothing is asked of the file
+            yield Path(entry.path)
+        elif entry.is_dir():
+            yield from links_in(entry.path)
+
+
 def _too_large(size_bytes: int, most_bytes: int) -> str:
     return f"is too large: {size_bytes / 1e6:,.0f} MB, at most {most_bytes / 1e6:,.0f} MB are read"

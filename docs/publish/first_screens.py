@@ -9,35 +9,25 @@ and ends with 1 if there is any. It needs Chromium and the extra `dev`.
 
 from __future__ import annotations
 
-import json
 import shutil
 import sys
 import tempfile
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
-import pandas as pd
 from matplotlib.figure import Figure
 from playwright.sync_api import Page, sync_playwright
 
-from harness.campaign.plan.stages import AssessmentStage, TrainingStage
-from harness.campaign.storage.manifest import planned
-from harness.config.campaign import Campaign
-from harness.config.scene import Scene
-from harness.config.toml_reading import read_document
-from harness.evaluation.comparisons.acceptance_checks import Evidence, judge
-from harness.evaluation.tables import table_of, typed
+from harness.campaign.results.published_run import published_tables
+from harness.campaign.storage.run_folder import RunFolder
 from harness.reports.page import render_page
-from harness.reports.run_tables import RunTables
 
 ROOT = Path(__file__).parents[2]
 REPORTS = ROOT / "reports"
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
 WIDTH, HEIGHT = 1280, 800
-TABLES = ("causes", "over_trainings", "preventability", "realism", "undecided", "attribution", "selections")
-"""Tables of the page that a run may have beside those that each has."""
 PARTS = "#acceptance, #failure-table, #first dl > div:not(.on-paper)"
 """What must be on the first screen: the bounds, the table, and each question with its answer."""
 SCHEMES: tuple[Literal["light", "dark"], ...] = ("light", "dark")
@@ -53,7 +43,7 @@ def main(folder: Path, runs: list[str]) -> None:
         browser = playwright.chromium.launch(executable_path=browser_file, args=["--no-sandbox"])
         for run in runs or published():
             file = Path(pages) / f"{run}.html"
-            file.write_text(render_page(published_tables(REPORTS / run)), encoding="utf-8")
+            file.write_text(render_page(published_tables(RunFolder(REPORTS / run))), encoding="utf-8")
             for scheme in SCHEMES:
                 tab = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT}, color_scheme=scheme)
                 tab.goto(file.as_uri())
@@ -77,35 +67,6 @@ def below_the_screen(page: Page) -> Iterator[str]:
         end = HEIGHT + 1 if box is None else box["y"] + box["height"]
         if end > HEIGHT:
             yield f"{' '.join(part.inner_text().split())[:50]} ({end:.0f})"
-
-
-def published_tables(folder: Path) -> RunTables:
-    """The tables of a published run folder, as far as they are published."""
-    manifest = json.loads((folder / "manifest.json").read_bytes())
-    stages, campaign = planned(manifest), Campaign.model_validate(manifest["campaign"], strict=False)
-    arms = {each.name: each.arm for each in stages if isinstance(each, AssessmentStage)}
-    tables: dict[str, Any] = {name: _table(folder, name) for name in ("episodes", "summary", "comparisons", "training")}
-    tables |= {name: _table(folder, name) for name in TABLES if (folder / f"{name}.csv").is_file()}
-    acceptance = campaign.acceptance
-    if acceptance is not None:
-        gaps = _table(folder, "gaps") if (folder / "gaps.csv").is_file() else table_of("gaps")
-        judged = {name: tables[name] for name in ("episodes", "summary", "comparisons", "preventability")}
-        evidence = Evidence(arms=arms, gaps=gaps, **judged)
-        personas = [*manifest["personas"], *campaign.mixed_people]
-        tables["acceptance"] = judge(acceptance.bounds, acceptance.ego, personas, campaign.seeds, evidence)
-    scene = read_document(ROOT / "networks" / Path(campaign.scene).name / "scene.toml", Scene)
-    return RunTables(
-        manifest=manifest,
-        arms=arms,
-        strategies={each.name: each.strategy for each in stages if isinstance(each, TrainingStage)},
-        non_ego_drives=all(each.drives for each in scene.players[1:]),
-        **tables,
-    )
-
-
-def _table(folder: Path, name: str) -> pd.DataFrame:
-    file = folder / f"{name}.csv"
-    return typed(pd.read_csv(file if file.is_file() else f"{file}.gz", keep_default_na=False, na_values=[""]))
 
 
 if __name__ == "__main__":

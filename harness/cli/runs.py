@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from harness.reports.human_ranges import HumanRow
-
-_STYLES = {"harm": "red", "mended": "green", "open": "default"}
 
 
 def replay(
@@ -142,22 +141,21 @@ def serve(
     """Show the report of a run with all of its recorded games, also those that its file has no room for.
 
     Of a folder of run folders, such as reports/: an index of all runs, those that are going on with the time left, each
-    with its report, and comparisons of runs of one ego. The page is at http://127.0.0.1:8000 for this machine alone,
-    until Ctrl-C.
+    with its report, and comparisons of runs of one ego. The report of a run that is published as its tables is made
+    from them, without games. The page is at http://127.0.0.1:8000 for this machine alone, until Ctrl-C.
     """
     import webbrowser
 
     from rich.console import Console
 
-    from harness.campaign.results.served_report import ServedReport, server_of
-    from harness.campaign.results.served_runs import ServedRuns
-    from harness.campaign.storage.run_folder import RunFolder
+    from harness.campaign.results.served_report import server_of
+    from harness.campaign.results.served_runs import served
 
-    console, folder = Console(), RunFolder(run)
+    console = Console()
     with console.status(messages.reading(run)):
-        served = ServedRuns(run) if folder.is_of_runs else ServedReport(folder)
+        answer = served(run).answer
     try:
-        server = server_of(served.answer, port)
+        server = server_of(answer, port)
     except OSError as error:
         reason = error.strerror or str(error)
         raise UsageError.of("--port", str(port), f"can't be opened: {reason}", "another port, or 0") from error
@@ -191,6 +189,7 @@ def runs(
             print_json([record_of(run) for run in found])
         elif found:
             console.print(terminal_table(found))
+            print_plain([f"The pages of the runs, and comparisons: harness serve {shlex.quote(str(folder))}"], console)
         else:
             print_plain([f"{folder}: there is no run" + (f" that contains {search!r}" if search else "")], console)
 
@@ -212,7 +211,8 @@ def compare(
 
     from harness.campaign.results.compare_runs import compare_runs
     from harness.files import write_atomically
-    from harness.reports.comparison_page import BETTER, WORSE, change_sentences, history_table
+    from harness.reports import comparison_terminal as terminal
+    from harness.reports.comparison_page import BETTER, WORSE
 
     console, page = Console(), out or folders[-1] / "compare.html"
     if not page.absolute().parent.is_dir():
@@ -221,16 +221,20 @@ def compare(
     write_atomically(page, comparison.page().encode())
     for run in folders:
         say_unchecked(run, console)
+    print_plain(terminal.run_lines(comparison), console)
     if comparison.histories:
-        console.print(history_table(comparison))
-    for transition in comparison.transitions:
-        print_plain([f"{transition.before.label} to {transition.after.label}: {transition.headline}"], console)
-        changed = [row for row in transition.rows if row.verdict in (WORSE, BETTER)]
-        for row in changed:
-            print_plain([f"  {row.sentence}"], console, _STYLES[row.tone])
-        if left := len(transition.rows) - len(changed):
-            print_plain([f"  {left} more figures are neither: the page has them"], console)
-        print_plain((f"  {sentence}" for sentence in change_sentences(transition)), console)
+        print_plain(["", "Failures"], console)
+        console.print(terminal.history_table(comparison, console.width), highlight=False)
+    for number, transition in enumerate(comparison.transitions, 1):
+        print_plain(["", f"{number} to {number + 1}, {transition.after.label}: {transition.headline}"], console)
+        changed = terminal.difference_table(transition.rows)
+        if changed.row_count:
+            console.print(changed, highlight=False)
+        if left := len(transition.rows) - sum(row.verdict in (BETTER, WORSE) for row in transition.rows):
+            print_plain([f"{left} more figures are neither: the page has them"], console)
+        if transition.counts:
+            print_plain(["Games that changed"], console)
+            console.print(terminal.change_table(transition), highlight=False)
     print_plain([f"Comparison: {page}"], console)
 
 

@@ -1,7 +1,8 @@
-"""Strategies and arms as records. Their names in tables, files and stages are derived here and nowhere else."""
+"""Strategies and arms as records. Their names in tables, files and stages are derived, and read, here alone."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 
 from harness.game.roles import EGO, NON_EGO, ROLES
@@ -207,6 +208,20 @@ def _borrowed_name(borrowed: Borrowed | None) -> str:
     if borrowed is None:
         return ""
     return "_attentive" if borrowed == ATTENTIVE else f"_with_{borrowed.trait}_of_{borrowed.of or 'nobody'}"
+
+
+_BORROWED_NAME = re.compile(r"_attentive|_with_\w+_of_\w+")
+
+
+def is_named_of_a_trait(arm: str, persona: str) -> bool:
+    """`Arm.is_of_a_trait` by the name of an arm and the persona that it belongs to."""
+    return bool(persona) and _BORROWED_NAME.fullmatch(arm.rpartition(f"_vs_{persona}")[2]) is not None
+
+
+def is_named_of_the_naive_ego(arm: str) -> bool:
+    """Whether the ego of an arm is a `NaiveEgo`, by the name of the arm."""
+    naive = strategy_name(NaiveEgo())
+    return arm.startswith((NAIVE_ALONE.name, f"{naive}_vs_"))
 
 
 def player_of(strategy: Strategy) -> int:

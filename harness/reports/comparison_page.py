@@ -5,19 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
 
 from harness.evaluation.comparisons.run_comparison import ChangedGame, Difference, GameChange, Side
-from harness.reports.differences import CHANCE, NO_RELEVANT_DIFFERENCE, RELEVANT_SPEED_MPS
+from harness.reports.differences import NO_RELEVANT_DIFFERENCE, RELEVANT_SPEED_MPS
 from harness.reports.embedding import key
 from harness.reports.figures import GAME
 from harness.reports.history_figures import PersonHistory, history_figures
 from harness.reports.numbers import MISSING, NO_SPACE, interval, number, percent, signed
 from harness.reports.page_template import environment_of
 from harness.reports.provenance import command_of, facts, made_by
-
-if TYPE_CHECKING:
-    from rich.table import Table
 
 BETTER, WORSE, UNKNOWN = "better", "worse", "not the same games"
 EQUAL, NOT_SHOWN = "no difference", "no difference shown"
@@ -38,8 +35,10 @@ class ComparedRow:
     found: Difference
     verdict: str
     tone: str
-    sentence: str
+    value_before: str
+    value_after: str
     before: str
+    """The value with its interval."""
     after: str
     difference: str
     interval: str
@@ -130,28 +129,6 @@ def headline(rows: Sequence[ComparedRow]) -> str:
     return f"Worse: {worse} of {len(rows)} figures; better: {better}."
 
 
-def history_table(comparison: Comparison) -> Table:
-    """The failures of each ego against each person in each run, for the terminal."""
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False)
-    for heading in ("ego", "against"):
-        table.add_column(heading, no_wrap=True)
-    for run in comparison.runs:
-        table.add_column(run.label, overflow="fold")
-    for each in comparison.histories:
-        cells = [each.text(place) or MISSING for place in range(len(comparison.runs))]
-        table.add_row(each.ego, each.person, *cells)
-    return table
-
-
-def change_sentences(transition: Transition) -> Iterator[str]:
-    """How many failures are fixed, new or came back, a line for each arm."""
-    for arm, counts in transition.counts.items():
-        words = ", ".join(f"{count} {change}" for change, count in counts.items() if count)
-        yield f"{arm}: {words}"
-
-
 def _facts(run: ComparedRun) -> Sequence[tuple[str, Any]]:
     return facts(run.manifest, (), len(run.manifest.get("personas", ())))
 
@@ -181,12 +158,12 @@ def _address(run: ComparedRun, arm: str, seed: int, episode: int) -> str:
 
 def _row(found: Difference, significance: float) -> ComparedRow:
     verdict = _verdict(found, significance)
-    sentence = f"{found.arm}: {found.measure} {_value(found, found.before)} before, {_value(found, found.after)} after"
     return ComparedRow(
         found=found,
         verdict=verdict,
         tone=TONES.get(verdict, "open"),
-        sentence=f"{sentence}: {CHANCE if verdict == NOT_SHOWN else verdict}, seed {found.seed}",
+        value_before=_value(found, found.before),
+        value_after=_value(found, found.after),
         before=_with_interval(found, found.before),
         after=_with_interval(found, found.after),
         difference=_with_unit(found, found.mean) if found.pairs else "",

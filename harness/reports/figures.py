@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
+from harness.reports.compact_svg import compact
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -80,14 +82,12 @@ def figure_of(width_in: float, height_in: float) -> Iterator[Figure]:
 _DOT = re.compile(r'(<a [^>]*>)\s*<g clip-path="[^"]*">\s*(<use [^>]*>)\s*</g>\s*</a>\s*')
 """The link of a dot, with its blanks and the clipping that changes nothing within the axes."""
 _STYLED = re.compile(r'<use xlink:href="#(C[^"]+)"[^>]* style="([^"]*)"')
-_PLACES = re.compile(r' (?:d|x|y|transform)="[^"]*"')
+_PLACES = re.compile(r' (?:x|y|transform)="[^"]*"')
 _DIGITS = re.compile(r"(\.\d\d)\d+")
-_POINT = re.compile(r"M (\S+ \S+) L \1(?=\s)")
-"""A line of no length, which is drawn as a dot."""
 
 
 def svg(figure: Figure, name: str, alternative: str) -> Markup:
-    """The figure as an element of the page. `name` is the prefix of its ids, which are unique on the page."""
+    """The figure as an element of the page. `name` is its class and the prefix of its ids, and unique on the page."""
     written = io.StringIO()
     figure.savefig(written, format="svg", transparent=True, metadata={"Date": None})
     drawn = written.getvalue()
@@ -98,12 +98,11 @@ def svg(figure: Figure, name: str, alternative: str) -> Markup:
     for marker, style in dict(_STYLED.findall(drawn)).items():  # all dots of a collection have the style of one
         drawn = re.sub(f'(<use xlink:href="#{marker}"[^>]*?) style="[^"]*"', r"\1", drawn)
         drawn = drawn.replace(f'<path id="{marker}"', f'<path id="{marker}" style="{style}"')
-    drawn = _PLACES.sub(lambda attribute: _DIGITS.sub(r"\1", attribute[0]).replace(" \n", " "), drawn)
-    drawn = _POINT.sub(r"M\1h0", drawn)
-    drawn = drawn.replace('xlink:href="#', f'href="#{name}-').replace("url(#", f"url(#{name}-")
-    drawn = drawn.replace(' id="', f' id="{name}-')
+    drawn = _PLACES.sub(lambda attribute: _DIGITS.sub(r"\1", attribute[0]), drawn)
     drawn = re.sub(r"font(?:-size)?: ([\d.]+px)(?:;? [^;\"]*'DejaVu Sans'[^;\"]*)", r"font-size: \1", drawn)
+    drawn = compact(drawn.replace("xlink:href=", "href="), name)
     for stand_in, colour in _PAGE_COLOURS.items():
         drawn = drawn.replace(stand_in, colour)
     role = "group" if GAME in drawn else "img"  # what is inside an image can't be a link
-    return Markup('<svg {} role="{}" aria-label="{}">').format(Markup(size[0]), role, alternative) + Markup(drawn)
+    head = Markup('<svg class="{}" {} role="{}" aria-label="{}">').format(name, Markup(size[0]), role, alternative)
+    return head + Markup(drawn)

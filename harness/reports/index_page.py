@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -69,6 +69,7 @@ class IndexedRun:
     last: WorstCell | None = None
     """Of the egos that are not naive."""
     has_page: bool = False
+    """Whether `harness serve` shows the page of the run."""
 
     def matches(self, text: str) -> bool:
         """Whether name, ego, scene or a persona contains a text, in any case."""
@@ -78,6 +79,7 @@ class IndexedRun:
 def render_index(folder: str, runs: Sequence[IndexedRun], search: str = "") -> str:
     """The page as HTML. `runs` are all runs of the folder; those that contain `search` are shown."""
     shown = [run for run in runs if run.matches(search)]
+    comparisons = dict(_comparisons(runs))
     rows = [
         {
             "run": run,
@@ -85,7 +87,7 @@ def render_index(folder: str, runs: Sequence[IndexedRun], search: str = "") -> s
             "state": state_words(run),
             "tone": _tone(run),
             "cells": _cells(run),
-            "compare": _comparisons(run, earlier(run, runs)),
+            "compare": comparisons.get(run.folder, []),
         }
         for run in shown
     ]
@@ -100,22 +102,23 @@ def render_index(folder: str, runs: Sequence[IndexedRun], search: str = "") -> s
     )
 
 
-def earlier(run: IndexedRun, runs: Sequence[IndexedRun]) -> list[IndexedRun]:
-    """The other runs of the same ego on the same scene that ended no later, the latest first; `runs` are sorted so."""
-    if run.state != "ended":
-        return []
-    same = [each for each in runs if (each.ego, each.scene, each.state) == (run.ego, run.scene, "ended")]
-    return same[same.index(run) + 1 :]
+def history_of(run: IndexedRun, runs: Sequence[IndexedRun]) -> list[IndexedRun]:
+    """The runs of the same ego on the same scene that ended, up to this one, the first of them first; empty if this one
+    has not ended. `runs` are sorted, the latest first."""
+    ended = [each for each in reversed(runs) if (each.ego, each.scene, each.state) == (run.ego, run.scene, "ended")]
+    return ended[: ended.index(run) + 1] if run in ended else []
 
 
-def _comparisons(run: IndexedRun, before: Sequence[IndexedRun]) -> list[tuple[str, str]]:
-    """The comparison of a run with the one before it, and with all before it: each in words, with its address."""
-    chosen = [(f"compare with {before[0].name}", before[:1])] if before else []
-    chosen += [(f"history of {len(before) + 1} runs", before)] if len(before) > 1 else []
-    return [
-        (words, "/".join(("compare", *(quote(each.folder.name) for each in (*reversed(others), run)))))
-        for words, others in chosen
-    ]
+def _comparisons(runs: Sequence[IndexedRun]) -> Iterator[tuple[Path, list[tuple[str, str]]]]:
+    """The folder of each run that ended, with its comparisons with the run before it, and with all before it
+    (`history_of`): each in words, with its address."""
+    before: dict[tuple[str, str], list[str]] = {}
+    for run in reversed(runs):
+        if run.state == "ended":
+            names, own = before.setdefault((run.ego, run.scene), []), quote(run.folder.name)
+            links = [(f"compare with {names[-1]}", f"compare/{quote(names[-1])}/{own}")] if names else []
+            yield run.folder, links + ([(f"history of {len(names) + 1} runs", f"history/{own}")] if names[1:] else [])
+            names.append(run.folder.name)
 
 
 def terminal_table(runs: Sequence[IndexedRun]) -> Table:

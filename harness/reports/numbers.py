@@ -10,6 +10,9 @@ MISSING = "–"
 SURE = f"95{NO_SPACE}%"
 """The confidence of every interval on the page."""
 
+ROUNDING = 1e-9
+"""A number that is nearer to 0 is an error of rounding."""
+
 
 def number(value: float, digits: int) -> str:
     """A number with `digits` decimals and a typographic minus."""
@@ -28,9 +31,10 @@ def trimmed(value: float, digits: int) -> str:
 
 
 def signed(value: float, digits: int) -> str:
-    """The same, with the sign of a number that rounds to 0: an end of an interval just below 0 is not 0."""
+    """The same, with the sign of a number that rounds to 0: an end of an interval just below 0 is not 0. An error of
+    rounding is 0."""
     text = trimmed(value, digits)
-    return f"{MINUS}{-value:.1g}" if value < 0 and text == "0" else text
+    return f"{MINUS}{-value:.1g}" if value < -ROUNDING and text == "0" else text
 
 
 def short(value: float) -> str:

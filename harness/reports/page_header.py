@@ -30,6 +30,7 @@ def troubles(tables: RunTables) -> dict[str, Any]:
     """The banners: what is unfinished, what could not be played, and what makes the numbers mean less."""
     errored = tables.episodes[unplayed(tables.episodes)]
     return {
+        "from_tables": tables.is_from_tables,
         "unfinished": tables.unfinished,
         "not_learned": [
             (name, stopped(each)) for name, each in tables.stages.items() if each.get("stopped") == DID_NOT_LEARN

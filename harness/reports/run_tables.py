@@ -111,6 +111,8 @@ class RunTables:
     """The checks of the campaign's bounds; None: it has none."""
     replays: Sequence[str] = ()
     """Names of the folders under `replays/`, in any order."""
+    is_from_tables: bool = False
+    """Whether the run is published as its tables: there is no game to watch."""
 
     @property
     def campaign(self) -> Mapping[str, Any]:

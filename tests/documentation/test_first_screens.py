@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from harness.campaign.results.published_run import published_tables
+from harness.campaign.storage.run_folder import RunFolder
 from harness.reports.page import render_page
 from tests.support.chromium import launched
 from tests.support.pages import blank_figures
@@ -17,7 +19,8 @@ first_screens = script("publish/first_screens.py")
 def below(tmp_path: Path, run: str) -> list[str]:
     page = tmp_path / f"{run}.html"
     with blank_figures():
-        page.write_text(render_page(first_screens.published_tables(first_screens.REPORTS / run)), encoding="utf-8")
+        folder = RunFolder(first_screens.REPORTS / run)
+        page.write_text(render_page(published_tables(folder)), encoding="utf-8")
     with launched() as browser:
         tab = browser.new_page(viewport={"width": first_screens.WIDTH, "height": first_screens.HEIGHT})
         tab.goto(page.as_uri())

@@ -16,6 +16,8 @@ from harness.evaluation.strategies import (
     RobustEgo,
     Strategy,
     SumoNonEgo,
+    is_named_of_a_trait,
+    is_named_of_the_naive_ego,
     persona_alone,
     player_of,
     round_of,
@@ -78,3 +80,22 @@ def test_arm__name(arm: Arm, name: str) -> None:
 def test_arm__a_best_response_belongs_to_its_pair() -> None:
     pair = Arm(ego=NaiveEgo(), non_ego=SPEEDY)
     assert RESPONSE.pair == pair.pair == pair
+
+
+@pytest.mark.parametrize(
+    ("arm", "persona", "of_a_trait", "of_the_naive"),
+    [
+        (Arm(ego=NaiveEgo()), "", False, True),
+        (Arm(ego=NaiveEgo(), non_ego=SumoNonEgo()), "", False, True),
+        (Arm(ego=OtherEgo(driver="naive_seed1"), non_ego=SPEEDY), "speedy", False, False),
+        (Arm(ego=RETRAINED, non_ego=SPEEDY), "speedy", False, False),
+        (RESPONSE, "speedy", False, True),
+        (Arm(ego=LATER, non_ego=PersonaNonEgo(persona="speedy", round=3)), "speedy", False, False),
+        (persona_alone("speedy", ATTENTIVE), "speedy", False, False),
+        (Arm(ego=NaiveEgo(), non_ego=PersonaNonEgo(persona="speedy", borrowed=ATTENTIVE)), "speedy", True, True),
+        (Arm(ego=NaiveEgo(), non_ego=PersonaNonEgo(persona="speedy_attentive")), "speedy_attentive", False, True),
+    ],
+)
+def test_name_of_an_arm__says_what_the_arm_does(arm: Arm, persona: str, of_a_trait: bool, of_the_naive: bool) -> None:
+    assert is_named_of_a_trait(arm.name, persona) == arm.is_of_a_trait == of_a_trait
+    assert is_named_of_the_naive_ego(arm.name) == isinstance(arm.ego, NaiveEgo) == of_the_naive

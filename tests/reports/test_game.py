@@ -17,7 +17,7 @@ from harness.reports.game_links import GameLinks
 from harness.reports.heatmaps import IN_EQUILIBRIUM, OPENS_A_GAME, views
 from tests.support.chromium import COLOURS, contrast, rgb, unfold
 from tests.support.game_tables import findings
-from tests.support.pages import Page, campaign, plain, rendered
+from tests.support.pages import Page, campaign, drawn_with, plain, rendered
 
 NO_LINKS = GameLinks(embedded=(), episodes=table_of("episodes"))
 
@@ -120,7 +120,7 @@ def test_heat_map__frames_what_an_equilibrium_plays(found):
     (mean, _, second) = game_section(found, NO_LINKS)["views"]
     for each in second["maps"]:
         assert set(re.search(r"In equilibrium: ([^\"]*)", each["figure"])[1].split("; ")) == pairs
-        assert each["figure"].count("stroke-width: 1.6") == len(pairs)
+        assert drawn_with("stroke-width:1.6", each["figure"]) == len(pairs)
         assert IN_EQUILIBRIUM in each["caption"]
     assert all("In equilibrium" not in each["figure"] + each["caption"] for each in mean["maps"])
 

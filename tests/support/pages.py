@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from html.parser import HTMLParser
@@ -283,3 +284,10 @@ def cannot_drive(arguments: dict[str, Any], seeds: Sequence[int] = (1,)) -> dict
         entry = arguments["manifest"]["stages"][f"speedy-seed{seed}"]
         entry |= {"stopped": DID_NOT_LEARN, "goals": 0, "played": GAMES, "goal_share_asked": 0.8}
     return recomputed(arguments, competence={})
+
+
+def drawn_with(style: str, figure: str) -> int:
+    """The number of shapes of a figure with a style, by their class or by themselves."""
+    rules = dict(re.findall(r"\.([a-z]+){([^}]*)}", figure))
+    of_class = [name for name in re.findall(r'class="([a-z]+)"', figure) if style in rules.get(name, "").split(";")]
+    return len(of_class) + sum(style in each.split(";") for each in re.findall(r'style="([^"]*)"', figure))

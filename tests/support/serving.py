@@ -17,9 +17,11 @@ def serving(answer: Callable[[str], tuple[str, bytes] | None]) -> Iterator[Threa
     with server_of(answer, 0) as server:
         thread = threading.Thread(target=server.serve_forever, args=(0.02,))
         thread.start()
-        yield server
-        server.shutdown()
-        thread.join()
+        try:
+            yield server
+        finally:
+            server.shutdown()
+            thread.join()
 
 
 def read(address: str, **headers: str) -> str:

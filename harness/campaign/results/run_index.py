@@ -11,18 +11,19 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
-from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.results.ci_files import RESULT
 from harness.campaign.storage.locks import is_held
-from harness.campaign.storage.manifest import FINISHED, planned
+from harness.campaign.storage.manifest import FINISHED
 from harness.campaign.storage.run_folder import MANIFEST, RunFolder
 from harness.campaign.storage.run_log import LOG
 from harness.errors import HarnessError, UsageError
-from harness.evaluation.strategies import NaiveEgo
+from harness.evaluation.strategies import is_named_of_a_trait, is_named_of_the_naive_ego
 from harness.reports.index_page import IndexedRun, WorstCell
 from harness.reports.provenance import ego_of, finished_on, scene_of
 
 _LINE = re.compile(r"(?P<time>\S+Z) \S+ +(?P<what>started|done|failed) +(?P<stage>[^\s:]+)")
+
+_COUNTED = ("arm", "persona", "failure_rate", "collisions", "rails", "timeouts", "episodes", "errors")
 
 
 def runs_in(folder: Path) -> list[IndexedRun]:
@@ -36,19 +37,21 @@ def runs_in(folder: Path) -> list[IndexedRun]:
 def indexed_run(path: Path) -> IndexedRun:
     try:
         return _read(RunFolder(path))
-    except (HarnessError, OSError, ValueError, KeyError) as error:
+    except (HarnessError, OSError, ValueError, LookupError, csv.Error) as error:
         return IndexedRun(folder=path, name=path.name, state="unreadable", problem=str(error))
 
 
 def _read(folder: RunFolder) -> IndexedRun:
-    manifest = folder.manifest()
+    manifest = folder.listed_manifest()
+    summary, result, log = (folder.path / name for name in ("summary.csv", RESULT, LOG))
+    for file in (summary, result, log):
+        folder.check_link(file)
     entries: Mapping[str, Mapping[str, Any]] = manifest["stages"]
     done = [name for name, entry in entries.items() if entry["status"] in FINISHED]
-    has_page = (folder.path / "report.html").is_file()
-    has_ended = len(done) == len(entries) and (folder.path / "summary.csv").is_file()
+    has_ended = len(done) == len(entries) and summary.is_file()
     held = not has_ended and is_held(folder.lock)
-    begun = _log_of(folder.path / LOG) if held else []
-    naive, last = _worst(manifest, folder.path / "summary.csv") if has_ended else (None, None)
+    begun = _log_of(log) if held else []
+    naive, last = _worst(summary) if has_ended else (None, None)
     return IndexedRun(
         folder=folder.path,
         name=folder.path.name,
@@ -64,11 +67,16 @@ def _read(folder: RunFolder) -> IndexedRun:
         stages=len(entries),
         running=[stage for stage, ended in _last_events(begun).items() if not ended],
         left_s=_left_s(entries, begun) if held else None,
-        accepted=_accepted(folder.path / RESULT) if has_ended else None,
+        accepted=_accepted(result) if has_ended else None,
         naive=naive,
         last=last,
-        has_page=has_page,
+        has_page=has_page(folder.path),
     )
+
+
+def has_page(path: Path) -> bool:
+    """Whether a run has a page: of a published one without a page, `harness serve` makes it from the tables."""
+    return (path / "report.html").is_file() or RunFolder(path).is_published
 
 
 def _accepted(file: Path) -> bool | None:
@@ -78,24 +86,27 @@ def _accepted(file: Path) -> bool | None:
     return accepted
 
 
-def _worst(manifest: Mapping[str, Any], summary: Path) -> tuple[WorstCell | None, WorstCell | None]:
-    """The worst cells of the naive ego, and of the others."""
+def _worst(summary: Path) -> tuple[WorstCell | None, WorstCell | None]:
+    """The worst cells of the naive ego, and of the others. The rows of arms without an ego have no failure rate."""
     cells: dict[str, list[int]] = {}
     with summary.open(encoding="utf-8", newline="") as file:  # pandas takes ten times as long for a table so short
-        for row in csv.DictReader(file):
-            if row["failure_rate"]:
-                cell = cells.setdefault(row["arm"], [0, 0])
-                cell[0] += int(row["collisions"]) + int(row["rails"]) + int(row["timeouts"])
-                cell[1] += int(row["episodes"]) - int(row["errors"])
-    arms = {each.name: each.arm for each in planned(manifest) if isinstance(each, AssessmentStage)}
-    own = {name: arm for name, arm in arms.items() if arm.ego is not None and not arm.is_of_a_trait}
-    of_naive = {name for name, arm in own.items() if isinstance(arm.ego, NaiveEgo)}
+        rows = csv.reader(file)
+        heading = next(rows, [])
+        places = [heading.index(name) for name in _COUNTED]
+        for row in rows:
+            arm, persona, rate, *counts = (row[place] for place in places)
+            if rate and not is_named_of_a_trait(arm, persona):
+                collisions, rails, timeouts, episodes, errors = map(int, counts)
+                cell = cells.setdefault(arm, [0, 0])
+                cell[0] += collisions + rails + timeouts
+                cell[1] += episodes - errors
     found = [WorstCell(arm=name, failures=failed, games=games) for name, (failed, games) in cells.items() if games]
-    return _of_arms(found, of_naive), _of_arms(found, own.keys() - of_naive)
+    of_naive = [cell for cell in found if is_named_of_the_naive_ego(cell.arm)]
+    return _greatest(of_naive), _greatest([cell for cell in found if cell not in of_naive])
 
 
-def _of_arms(cells: Sequence[WorstCell], arms: set[str]) -> WorstCell | None:
-    return max((cell for cell in cells if cell.arm in arms), key=lambda cell: cell.failures / cell.games, default=None)
+def _greatest(cells: Sequence[WorstCell]) -> WorstCell | None:
+    return max(cells, key=lambda cell: cell.failures / cell.games, default=None)
 
 
 # --- a run that is going on ----------------------------------------------------------------------------------------

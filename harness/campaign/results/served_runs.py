@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import datetime, timezone
 from pathlib import Path
 from threading import Lock
@@ -10,14 +11,15 @@ from urllib.parse import parse_qs, quote, unquote, urlsplit
 from harness.campaign.plan.stages import Stage, TrainingStage
 from harness.campaign.plan.strategy_stages import training_settings
 from harness.campaign.results.compare_runs import compare_runs
-from harness.campaign.results.run_index import begun_once, indexed_run, runs_in
+from harness.campaign.results.published_run import PublishedReport
+from harness.campaign.results.run_index import begun_once, has_page, indexed_run, runs_in
 from harness.campaign.results.served_report import PAGE, ServedReport
 from harness.campaign.storage.manifest import planned
 from harness.campaign.storage.run_folder import MANIFEST, RunFolder
 from harness.campaign.storage.training_curves import CHECKPOINT, curves_so_far
 from harness.config.campaign import Campaign
 from harness.errors import UsageError
-from harness.reports.index_page import render_index
+from harness.reports.index_page import history_of, render_index
 from harness.reports.learning import learning
 from harness.reports.run_tables import RunTables
 from harness.reports.running_page import RunningStage, render_running
@@ -28,7 +30,7 @@ class ServedRuns:
 
     def __init__(self, folder: Path) -> None:
         self._folder, self._lock = folder, Lock()
-        self._reports: dict[tuple[str, int], ServedReport] = {}
+        self._reports: dict[tuple[str, int], ServedReport | PublishedReport] = {}
 
     def answer(self, path: str) -> tuple[str, bytes] | None:
         """Content type and content of a path; None if there is nothing. Raises UsageError as `ServedReport.answer` and
@@ -39,30 +41,41 @@ class ServedRuns:
             search = parse_qs(parts.query).get("search", [""])[0]
             return PAGE, render_index(str(self._folder), runs_in(self._folder), search).encode()
         if first == "compare" and len(rest) > 1 and all(map(self._is_run, rest)):
-            addresses = [f"/{quote(name)}/" if (self._folder / name / "report.html").is_file() else "" for name in rest]
-            return PAGE, compare_runs([self._folder / name for name in rest], addresses).page().encode()
+            return self._comparison(rest)
+        if first == "history" and len(rest) == 1 and self._is_run(rest[0]):
+            of_ego = history_of(indexed_run(self._folder / rest[0]), runs_in(self._folder))
+            return self._comparison([run.folder.name for run in of_ego]) if len(of_ego) > 1 else None
         if not rest or not self._is_run(first):
             return None
         run, below = self._folder / first, parts.path.removeprefix("/").partition("/")[2]
-        if RunFolder(run).is_published:
-            report = run / "report.html"
-            return (PAGE, report.read_bytes()) if not below and report.is_file() else None
-        if not has_report(run):
+        if not has_report(run) and not RunFolder(run).is_published:
             return (PAGE, running_page(run).encode()) if not below else None
         return self._report(first).answer(f"/{below}")
+
+    def _comparison(self, names: Sequence[str]) -> tuple[str, bytes]:
+        addresses = [f"/{quote(name)}/" if has_page(self._folder / name) else "" for name in names]
+        return PAGE, compare_runs([self._folder / name for name in names], addresses).page().encode()
 
     def _is_run(self, name: str) -> bool:
         return name in {file.parent.name for file in self._folder.glob(f"*/{MANIFEST}")}
 
-    def _report(self, name: str) -> ServedReport:
+    def _report(self, name: str) -> ServedReport | PublishedReport:
         """The report of a run as it is now."""
         run = RunFolder(self._folder / name)
         key = (name, run.manifest_file.stat().st_mtime_ns)
         with self._lock:
             if key not in self._reports:
                 self._reports = {each: report for each, report in self._reports.items() if each[0] != name}
-                self._reports[key] = ServedReport(run)
+                self._reports[key] = PublishedReport(run) if run.is_published else ServedReport(run)
             return self._reports[key]
+
+
+def served(path: Path) -> ServedRuns | ServedReport | PublishedReport:
+    """What a server sends of a run folder, or of a folder of run folders. Raises UsageError for any other."""
+    folder = RunFolder(path)
+    if folder.is_of_runs:
+        return ServedRuns(path)
+    return PublishedReport(folder) if folder.is_published else ServedReport(folder)
 
 
 def has_report(path: Path) -> bool:

@@ -68,6 +68,31 @@ class StageEntry(_Record):
     """Of a training: the least share of these games for its player to have learned."""
 
 
+class _ListedEgo(_Record):
+    driver: Text
+
+
+class _ListedCampaign(_Record):
+    scene: Text
+    ego: _ListedEgo
+
+
+class _ListedEgoDriver(_Record):
+    in_words: Text = ""
+
+
+class ListedManifest(_Record):
+    """What a list of runs reads of a manifest: reading all of it loads what plays games, to check the personas."""
+
+    quick: bool
+    campaign: _ListedCampaign
+    ego_driver: _ListedEgoDriver | None = None
+    personas: list[Name]
+    seeds: list[Seed]
+    versions: dict[Text, Text]
+    stages: dict[Text, StageEntry]
+
+
 class Manifest(_Record):
     format: int
     name: CampaignName
@@ -112,15 +137,16 @@ class Manifest(_Record):
         return self
 
 
-def read_manifest(file: Path, content: bytes) -> dict[str, Any]:
-    """The content of a manifest. Raises UsageError if it is damaged, or has another format than `FORMAT`."""
+def read_manifest(file: Path, content: bytes, form: type[Document] = Manifest) -> dict[str, Any]:
+    """The content of a manifest, of which what is in `form` is checked. Raises UsageError if it is damaged, or has
+    another format than `FORMAT`."""
     try:
         manifest: dict[str, Any] = json.loads(content)
         found = manifest.get("format") if isinstance(manifest, dict) else None
         if isinstance(found, int) and found != FORMAT:
             message = f"the run folder has format {found}, this version of the harness reads format {FORMAT}"
             raise UsageError.of(file, "format", message, RUN_AGAIN)
-        Manifest.model_validate_json(content)
+        form.model_validate_json(content)
         return manifest
     except ValidationError as error:
         wrong = [f"{'.'.join(map(str, each['loc'])) or 'it'}: {each['msg']}" for each in error.errors()]

@@ -32,10 +32,17 @@ from typing import Any
 from harness.campaign.plan.stages import stage_id
 from harness.campaign.storage.checksums import mismatches, read_checksums, write_checksums
 from harness.campaign.storage.locks import InUse, only_one, wait_for_workers
-from harness.campaign.storage.manifest import RUN_AGAIN, StageEntry, checksum_of_content, read_manifest
+from harness.campaign.storage.manifest import (
+    RUN_AGAIN,
+    ListedManifest,
+    Manifest,
+    StageEntry,
+    checksum_of_content,
+    read_manifest,
+)
 from harness.campaign.storage.run_log import LOG, run_log
 from harness.errors import Problem, UsageError
-from harness.files import content_of, drop_scratch, has_digest, leads_out, make_folder, write_atomically
+from harness.files import content_of, drop_scratch, has_digest, leads_out, links_in, make_folder, write_atomically
 
 MANIFEST = "manifest.json"
 JUDGED, TAKEN_OVER, SELECTED = "reference_drivers.csv", "takeovers.csv", "selections.csv"
@@ -175,7 +182,19 @@ class RunFolder:
     # --- the manifest --------------------------------------------------------------------------------------------
 
     def manifest(self) -> dict[str, Any]:
-        """The manifest. Raises UsageError if the folder has none that can be read."""
+        """The manifest. Raises UsageError if the folder has none that can be read, or has a link that leads out."""
+        manifest = self._manifest(Manifest)
+        for place in links_in(self.path):
+            self.check_link(place)
+        return manifest
+
+    def listed_manifest(self) -> dict[str, Any]:
+        """The manifest, checked as far as a list of runs reads it (`ListedManifest`); other files are not looked at.
+        Raises UsageError if the folder has none that can be read."""
+        return self._manifest(ListedManifest)
+
+    def _manifest(self, form: type[Manifest] | type[ListedManifest]) -> dict[str, Any]:
+        self.check_link(self.manifest_file)
         try:
             content = content_of(self.manifest_file, _MOST_MANIFEST_BYTES)
         except (FileNotFoundError, NotADirectoryError):
@@ -183,13 +202,13 @@ class RunFolder:
             raise UsageError.of(self.path, "", message, "name the folder a campaign wrote") from None
         except OSError as error:
             raise UsageError.of(self.manifest_file, "", f"is damaged: {error.strerror}", RUN_AGAIN) from None
-        manifest = read_manifest(self.manifest_file, content)
-        for folder, folders, files in os.walk(self.path):
-            for place in (Path(folder) / name for name in (*folders, *files)):
-                if place.is_symlink() and leads_out(place, self.path):  # what it points to is not the run's
-                    message = "is a link that leads out of the run folder"
-                    raise UsageError.of(place, "", message, "put there what it points to")
-        return manifest
+        return read_manifest(self.manifest_file, content, form)
+
+    def check_link(self, place: Path) -> None:
+        """Raises UsageError for a link that leads out of the folder: what it points to is not the run's."""
+        if place.is_symlink() and leads_out(place, self.path):
+            message = "is a link that leads out of the run folder"
+            raise UsageError.of(place, "", message, "put there what it points to")
 
     def check_whole(self, manifest: Mapping[str, Any]) -> None:
         """Raises UsageError where files of the stages are missing, as in a folder that was published without them, or
@@ -205,7 +224,8 @@ class RunFolder:
         """Raises UsageError for a published folder."""
         if self.is_published:
             message = "holds a report and its tables, but not the files that they are made from"
-            remedy = f"read its report.html, or play the games: run campaign {manifest['name']!r} again"
+            see = f"see its page (report.html, or harness serve {self.path})"
+            remedy = f"{see}, or play the games: run campaign {manifest['name']!r} again"
             raise UsageError.of(self.path, "", message, remedy)
 
     def check_games(self, arm: str, seed: int) -> None:

@@ -46,14 +46,19 @@ def find(
     """
     if not pairings and not responses:
         return None
-    games = games_by_arm(episodes)
-    bounds = dict.fromkeys((each.seed, bound) for each in pairings for bound in each.alone)
-    reasons = [(seed, gate([bound], seed, games)["reason"]) for seed, bound in bounds]
     cells = crossplay(pairings, episodes)
     return GameFindings(
         gaps=gaps(responses, episodes, significance),
         crossplay=cells,
         equilibria=with_held_out_rates(equilibria(cells), pairings, episodes),
         generalisation=generalisation(trained_against, pairings, episodes, significance),
-        cautions=[(seed, reason) for seed, reason in reasons if reason],
+        cautions=cautions(pairings, episodes),
     )
+
+
+def cautions(pairings: Sequence[Pairing], episodes: pd.DataFrame) -> list[tuple[int, str]]:
+    """`GameFindings.cautions` of a run."""
+    games = games_by_arm(episodes)
+    bounds = dict.fromkeys((each.seed, bound) for each in pairings for bound in each.alone)
+    reasons = [(seed, gate([bound], seed, games)["reason"]) for seed, bound in bounds]
+    return [(seed, reason) for seed, reason in reasons if reason]

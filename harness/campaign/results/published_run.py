@@ -1,0 +1,110 @@
+"""The page of a published run: the one that is published with it, or one from its tables, without games."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from harness.campaign.plan.stages import AssessmentStage, TrainingStage
+from harness.campaign.results.drawn_starts import drawn_starts
+from harness.campaign.results.matchups import matchups_of
+from harness.campaign.results.served_report import PAGE
+from harness.campaign.storage.manifest import is_tuned, planned
+from harness.campaign.storage.run_folder import RunFolder
+from harness.config.campaign import Campaign
+from harness.evaluation.comparisons.acceptance_checks import Evidence, judge
+from harness.evaluation.game_theory.findings import GameFindings, cautions
+from harness.evaluation.tables import read_csv, table_of
+from harness.files import has_digest
+from harness.reports.page import render_page
+from harness.reports.run_tables import RunTables
+from harness.road.scene.open_scene import open_scene
+from harness.shipped_documents import shipped
+
+_ALWAYS = ("episodes", "summary", "comparisons", "training")
+_MAYBE = (
+    *("causes", "manoeuvres", "over_trainings", "preventability", "realism", "undecided", "attribution", "selections"),
+    *("reconfiguration", "shields", "perception", "populations", "reference_drivers", "takeovers"),
+)
+_OF_GAME = ("gaps", "crossplay", "equilibria", "generalisation")
+
+
+class PublishedReport:
+    """What the server of a published run sends: its page."""
+
+    def __init__(self, folder: RunFolder) -> None:
+        """Raises UsageError as `published_tables` does. A page from tables takes some time, and is kept in memory."""
+        report = folder.path / "report.html"
+        if report.is_file():
+            folder.check_link(report)
+            self._page = report.read_bytes()
+        else:
+            self._page = render_page(published_tables(folder)).encode()
+
+    def answer(self, path: str) -> tuple[str, bytes] | None:
+        """Content type and content of a path; None if there is nothing."""
+        return (PAGE, self._page) if path in ("/", "/report.html") else None
+
+
+def published_tables(folder: RunFolder) -> RunTables:
+    """The tables of a published run, as far as they are published. Raises UsageError for a damaged one."""
+    manifest = folder.manifest()
+    stages, campaign = planned(manifest), Campaign.model_validate(manifest["campaign"], strict=False)
+    arms = {each.name: each.arm for each in stages if isinstance(each, AssessmentStage)}
+    names = [*_ALWAYS, *(name for name in _MAYBE if _is_there(folder.path, name))]
+    frames: dict[str, Any] = {name: read_csv(folder.path / f"{name}.csv") for name in names}
+    tables = RunTables(
+        manifest=manifest,
+        arms=arms,
+        strategies={each.name: each.strategy for each in stages if isinstance(each, TrainingStage)},
+        is_from_tables=True,
+        **frames,
+    )
+    tables = _with_scene(tables, campaign)
+    tables = replace(tables, game=_game(folder, campaign, tables))
+    acceptance = campaign.acceptance
+    if acceptance is None:
+        return tables
+    evidence = Evidence(
+        arms=arms,
+        episodes=tables.episodes,
+        summary=tables.summary,
+        comparisons=tables.comparisons,
+        gaps=tables.game.gaps if tables.game is not None else table_of("gaps"),
+        preventability=tables.preventability if "preventability" in frames else None,
+    )
+    personas = [*manifest["personas"], *campaign.mixed_people]
+    return replace(tables, acceptance=judge(acceptance.bounds, acceptance.ego, personas, campaign.seeds, evidence))
+
+
+def _is_there(folder: Path, name: str) -> bool:
+    return any((folder / f"{name}.csv{suffix}").is_file() for suffix in ("", ".gz"))
+
+
+def _with_scene(tables: RunTables, campaign: Campaign) -> RunTables:
+    """The tables with what the scene tells. The run's own copy is not published, but the scene may be a shipped one. It
+    tells the starts only if it is as it was then."""
+    folder = shipped("networks") / Path(campaign.scene).name
+    if not folder.is_dir():
+        return tables
+    scene = open_scene(folder)
+    tables = replace(tables, non_ego_drives=all(each.drives for each in scene.document.players[1:]))
+    files = {Path(file): digest for file, digest in tables.manifest["hashes"].items()}
+    digests = {file.name: digest for file, digest in files.items() if file.parent.name == folder.name}
+    if not (digests and all(has_digest(folder / name, [digest]) for name, digest in digests.items())):
+        return tables
+    return replace(tables, starts=drawn_starts(scene, campaign.start_seed, tables.episodes["episode"]))
+
+
+def _game(folder: RunFolder, campaign: Campaign, tables: RunTables) -> GameFindings | None:
+    manifest = tables.manifest
+    done = {name for name, entry in manifest["stages"].items() if entry["status"] == "done"}
+    game = matchups_of(campaign, manifest["personas"], done, is_tuned(manifest))
+    if game is None:
+        return None
+    found = {
+        name: read_csv(folder.path / f"{name}.csv") if _is_there(folder.path, name) else table_of(name)
+        for name in _OF_GAME
+    }
+    return GameFindings(**found, cautions=cautions(game.pairings, tables.episodes))

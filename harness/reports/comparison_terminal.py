@@ -1,0 +1,87 @@
+"""The comparison of runs on the terminal: tables whose columns are aligned, within 80 columns for up to five runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+from typing import TYPE_CHECKING
+
+from harness.reports.comparison_page import BETTER, CHANGES, WORSE, ComparedRow, Comparison, Transition
+from harness.reports.numbers import MISSING, NO_SPACE, interval
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from harness.reports.history_figures import PersonHistory
+
+_STYLES = {"harm": "red", "mended": "green", "open": "default"}
+
+
+def run_lines(comparison: Comparison) -> Iterator[str]:
+    """The number of each run in the tables, with its name."""
+    for place, run in enumerate(comparison.runs, 1):
+        yield f"{place}  {run.label}"
+
+
+def history_table(comparison: Comparison, width: int) -> Table:
+    """The failures of each ego against each person in each run, by the run's number; with intervals where the terminal
+    of `width` columns has room for them."""
+    rows = [[_cells(each, place) for place in range(len(comparison.runs))] for each in comparison.histories]
+    table = _table()
+    table.add_column("ego, person", no_wrap=True)
+    names = max((2 + len(each.person) for each in comparison.histories), default=0)
+    needed = sum(2 + max(map(len, column)) for row in zip(*rows, strict=True) for column in zip(*row, strict=True))
+    with_intervals = names + needed <= width
+    for place in range(len(comparison.runs)):
+        table.add_column(str(place + 1), justify="right", no_wrap=True)
+        if with_intervals:
+            table.add_column("95 %", no_wrap=True)
+    for ego, group in groupby(zip(comparison.histories, rows, strict=True), key=lambda each: each[0].ego):
+        table.add_row(ego, style="bold")
+        for history, cells in group:
+            table.add_row(f"  {history.person}", *(text for cell in cells for text in cell[: 1 + with_intervals]))
+    return table
+
+
+def _cells(history: PersonHistory, place: int) -> tuple[str, str]:
+    """The failures of a run over all training seeds, and the interval of one."""
+    rates = list(history.rates[place].values())
+    if not rates:
+        return MISSING, ""
+    counts = f"{sum(each.failures for each in rates)} of {sum(each.games for each in rates)}"
+    only = interval(rates[0].low, rates[0].high).replace(NO_SPACE, " ") if len(rates) == 1 else f"{len(rates)} seeds"
+    return counts, only
+
+
+def difference_table(rows: Sequence[ComparedRow]) -> Table:
+    """The figures that became worse, then those that became better, arm by arm."""
+    table = _table()
+    table.add_column("arm, figure", overflow="fold")
+    for heading in ("seed", "before", "after"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("", no_wrap=True)
+    changed = [row for row in rows if row.verdict in (WORSE, BETTER)]
+    for (_, arm), group in groupby(changed, key=lambda row: (row.verdict, row.found.arm)):
+        table.add_row(arm, style="bold")
+        for row in group:
+            values = (row.value_before, row.value_after)
+            table.add_row(f"  {row.found.measure}", str(row.found.seed), *values, row.verdict, style=_STYLES[row.tone])
+    return table
+
+
+def change_table(transition: Transition) -> Table:
+    """How many failures are fixed, new or came back, a line for each arm."""
+    table = _table()
+    table.add_column("arm", overflow="fold")
+    shown = [change for change in CHANGES if any(counts[change] for counts in transition.counts.values())]
+    for change in shown:
+        table.add_column(change, justify="right", no_wrap=True)
+    for arm, counts in transition.counts.items():
+        table.add_row(arm, *(str(counts[change] or MISSING) for change in shown))
+    return table
+
+
+def _table() -> Table:
+    from rich.table import Table
+
+    return Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
