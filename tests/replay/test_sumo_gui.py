@@ -88,6 +88,22 @@ def test_gui__shows_both_cars_where_the_trace_has_them(
         assert abs(y_m - expected.loc[player, "y_m"]) < 1.0
 
 
+def test_gui__prints_the_label_of_a_contact_on_white_above_the_road(
+    screen: str, merge_net: Path, tmp_path: Path
+) -> None:
+    trace = collision_game()
+    (picture,) = photograph(write(trace, merge_net, tmp_path / "replay"), screen, [15])
+    found = contacts(trace, types_of_vehicles(trace, [merge_net.with_name("merge.rou.xml")]), RAILS)
+    view = choose_view(trace, found)
+    height, width = picture.shape[:2]
+    per_px = max(view.width_m / width, view.height_m / height)
+    column = round(0.5 * width + (found[0].x_m - view.x_m) / per_px)
+    row = round(0.5 * height - (found[0].y_m + 8.0 - view.y_m) / per_px)
+    around = picture[row + 8 : row + 20, column - 20 : column + 20]  # SUMO-GUI prints it below its place
+    assert (around.min(-1) > 240).mean() > 0.4
+    assert (around.max(-1) < 120).mean() > 0.05  # the letters
+
+
 def test_gui__follows_the_ego_and_halts_at_the_contact(
     screen: str, merge_net: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
