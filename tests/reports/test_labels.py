@@ -83,9 +83,13 @@ def cut_off(page, texts):
     return [text[0] for text in texts if min(text[1:3]) < 0 or text[3] > box["width"] or text[4] > box["height"]]
 
 
+@pytest.mark.parametrize("whole_road", [False, True])
 @pytest.mark.parametrize("settings", SETTINGS)
-def test_names__with_the_reference_driver_are_apart_at_all_times(player, settings):
+def test_names__with_the_reference_driver_are_apart_at_all_times(player, settings, whole_road):
     page = player(f"#game={JUDGED}", **settings)
+    if whole_road:
+        page.locator(".player").focus()
+        page.keyboard.press("f")
     for step in range(0, STEPS, 3):
         texts = page.evaluate(AT, step * STEP_S)
         names = [text[0].partition(" ·")[0] for text in texts]
