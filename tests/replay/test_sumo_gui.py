@@ -51,15 +51,15 @@ def photograph(folder: Path, screen: str, steps: list[int]) -> list[np.ndarray]:
     (folder / "view.xml").write_text(settings.replace("</viewsettings>", taken + "</viewsettings>"))
     command = [str(find_sumo_gui()), "-c", str(folder / "scene.sumocfg"), "--quit-on-end"]
     environment = os.environ | {"DISPLAY": screen}
-    for _ in range(5):  # SUMO-GUI dies of SIGSEGV or does not end now and then
+    for _ in range(5):  # SUMO-GUI dies of SIGSEGV, does not end, or takes pictures of one pixel now and then
         with contextlib.suppress(subprocess.TimeoutExpired):
             done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
             if done.returncode >= 0:
                 assert done.returncode == 0, done.stderr
-                break
-    else:
-        pytest.fail("SUMO-GUI died or did not end in five attempts")
-    return [np.asarray(Image.open(file).convert("RGB")).astype(int) for file in files]
+                pictures = [np.asarray(Image.open(file).convert("RGB")).astype(int) for file in files]
+                if all(picture.size > 3 for picture in pictures):
+                    return pictures
+    pytest.fail("SUMO-GUI died, did not end or took no picture in five attempts")
 
 
 def place(mask: np.ndarray, trace: pd.DataFrame, net: Path) -> tuple[float, float]:
