@@ -3,7 +3,8 @@
     python docs/publish/pictures.py [NAME...]
 
 takes those of a shipped scene (drawn by `harness scene show`), of the published report (`report`), or of a tutorial
-after its steps; without a name, all of them. It needs Chromium and the extra `dev`.
+after its steps, whose printed output it writes into the tutorial's page; without a name, all of them. It needs
+Chromium, Xvfb and the extra `dev`.
 """
 
 from __future__ import annotations
@@ -17,9 +18,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from desktop import halted_replay
 from PIL import Image
 from playwright.sync_api import ViewportSize, sync_playwright
 from tutorial_steps import carry_out
+
+from harness.replay.gui_settings import WINDOW_PX
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -55,6 +59,19 @@ class Picture(NamedTuple):
     """What is pressed on the page before."""
 
 
+class Desktop(NamedTuple):
+    """SUMO-GUI where the replay of a game halts."""
+
+    file: str
+    """Of the picture, below docs/."""
+    run: str
+    """The run, below the folder of the tutorial."""
+    arm: str
+    episode: int
+    width: int = WINDOW_PX[0]
+    height: int = WINDOW_PX[1]
+
+
 PUBLISHED = {
     "report": (Picture("report.png", "reports/paper_merge/report.html"),),
     "reading-a-report": (
@@ -79,6 +96,12 @@ TUTORIALS = {
     ),
 }
 """Pictures of pages that the steps of a tutorial write."""
+DESKTOPS = {
+    "from-a-failure-to-a-regression-test": (
+        Desktop("tutorials/sumo-gui.png", "reports/my_ego", "naive_vs_paper_speedy", 5),
+    ),
+}
+"""Pictures of SUMO-GUI that a tutorial opens."""
 CONTINUED = {"from-a-failure-to-a-regression-test": "your-own-ego"}
 """Tutorials that go on in the folder of another."""
 
@@ -98,8 +121,11 @@ def main() -> None:
                 tab.wait_for_timeout(500)  # the page opens the game that its address names
                 for key in picture.keys:
                     tab.keyboard.press(key)
-                (DOCS / picture.file).write_bytes(smaller(tab.screenshot()))
+                write(picture.file, Image.open(io.BytesIO(tab.screenshot())))
                 tab.close()
+            for desktop in DESKTOPS.get(name, ()):
+                place = Path(folder) / CONTINUED.get(name, name)
+                write(desktop.file, halted_replay(place, desktop.run, desktop.arm, desktop.episode))
         browser.close()
 
 
@@ -125,12 +151,10 @@ def pages_of(name: str, folder: Path) -> Iterator[tuple[Picture, str]]:
         yield picture, (place / file).as_uri() + (f"#{part}" if part else "")
 
 
-def smaller(png: bytes) -> bytes:
-    """A picture with a palette: a page has few colours."""
-    out = io.BytesIO()
-    with Image.open(io.BytesIO(png)) as picture:
-        picture.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(out, "png", optimize=True)
-    return out.getvalue()
+def write(file: str, picture: Image.Image) -> None:
+    """Write a picture below docs/ with a palette: a page has few colours."""
+    few = picture.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
+    few.save(DOCS / file, "png", optimize=True)
 
 
 if __name__ == "__main__":

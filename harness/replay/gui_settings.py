@@ -19,7 +19,7 @@ _NET_MARGIN_M = 6.0  # added around a net by SUMO-GUI at zoom 100
 _AROUND_M = 12.0  # of road beyond the places of the players
 _WIDEST_M = 220.0  # a car of 4.6 m is then 27 pixels long
 _WIDEST_WITH_CONTACT_M = 120.0  # 49 pixels: the contact must be visible
-_GROUND, _ASPHALT = "214,224,206", "96,98,104"
+_GROUND, _ASPHALT, _BEHIND_TEXT = "214,224,206", "96,98,104", "white"
 # "Delay in milliseconds" is per simulated second (GUIRunThread.cpp), so 1000 is real time.
 _DELAY_MS = 2000
 
@@ -82,9 +82,8 @@ def view_settings(
     ElementTree.SubElement(
         scheme, "vehicles", vehicleQuality="2", showBlinker="0", vehicle_minSize="1", vehicle_exaggeration="1"
     )
-    ElementTree.SubElement(
-        scheme, "pois", poiType_show="1", poiType_size="70", poiType_color="black", poiType_constantSize="1"
-    )
+    texts = {"show": "1", "size": "70", "color": "black", "bgColor": _BEHIND_TEXT, "constantSize": "1"}
+    ElementTree.SubElement(scheme, "pois", {f"poiType_{name}": value for name, value in texts.items()})
     ElementTree.SubElement(
         root, "viewport", x=f"{view.x_m:.2f}", y=f"{view.y_m:.2f}", zoom=f"{100 * wanted / whole:.2f}"
     )

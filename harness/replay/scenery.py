@@ -27,6 +27,8 @@ _AFTER_THE_GAME_S = 3600.0
 _COLOURS = {"cone": "255,110,0", "closed_lane": "200,60,40,120", "debris": "120,90,60", "wall": "90,90,100"}
 _BUILDING_COLOUR, _RAIL_COLOUR, _CONTACT_COLOUR = "150,140,130", "24,26,32", "220,20,20"
 _RING_RADIUS_M = 4.0
+_TITLE_SHARE = 0.05
+"""The least distance of other texts from the title, of the height of the picture: a line is 20 of 450 pixels."""
 _OF_LABEL = "_label"
 
 
@@ -44,15 +46,25 @@ def scenery(
         ElementTree.SubElement(root, "vType", drawn.attributes())
     for number, rail in enumerate(rails):
         root.append(_shape(f"rail_{number}", rail, _RAIL_COLOUR, layer=5, width_m=0.4))
+    title_y_m = view.y_m + 0.4 * view.height_m
     turn = np.linspace(0.0, 2.0 * math.pi, 37)
     for number, contact in enumerate(touches):
         ring = np.array((contact.x_m, contact.y_m)) + _RING_RADIUS_M * np.stack((np.cos(turn), np.sin(turn)), axis=-1)
         root.append(_shape(f"contact_{number}", ring, _CONTACT_COLOUR, layer=6, width_m=0.24))
-        side = -1 if number % 2 else 1  # the labels of two near contacts do not overlap
-        away_m = side * 2.0 * _RING_RADIUS_M
+        away_m = _away_m(number, title_y_m - contact.y_m, view.height_m)
         root.append(_text(f"contact_{number}{_OF_LABEL}", contact.label, contact.x_m, contact.y_m + away_m))
-    root.append(_text("title", title, view.x_m, view.y_m + 0.4 * view.height_m))
+    root.append(_text("title", title, view.x_m, title_y_m))
     return root
+
+
+def _away_m(number: int, title_m: float, height_m: float) -> float:
+    """How far above a contact its label is, by its number and how far above it the title is.
+
+    The labels of two near contacts do not overlap, and neither overlaps the title.
+    """
+    if abs(title_m - 2.0 * _RING_RADIUS_M) < _TITLE_SHARE * height_m:
+        return -(2.0 + number % 2) * _RING_RADIUS_M
+    return (-2.0 if number % 2 else 2.0) * _RING_RADIUS_M
 
 
 def labels_of_contacts(document: ElementTree.Element) -> Iterator[tuple[str, FloatArray, FloatArray]]:

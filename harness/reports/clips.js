@@ -17,7 +17,10 @@ async function clip(figure) {
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     camera.look([game], shown, width, height);
     drawRoad(context, camera, ratio);
-    drawGame(context, camera, ratio, game, shown, true);
+    drawGame(context, camera, ratio, game, shown);
+    const [halfX, halfY] = [button.offsetWidth / 2, button.offsetHeight / 2];
+    const covered = { x: button.offsetLeft + halfX, y: button.offsetTop + halfY, halfX, halfY };
+    drawNames(context, camera, playerNames(camera, game, shown), [covered]);
     figure.dataset.time = time.toFixed(3);
   }
 

@@ -23,7 +23,7 @@ ELSEWHERE = '<script type="application/json" id="elsewhere">{}</script>'
 SCRIPTS = tuple(
     f"{name}.js"
     for name in (
-        *("recorded", "road", "sight", "vehicles", "strips", "screen", "player"),
+        *("recorded", "road", "sight", "vehicles", "labels", "strips", "screen", "player"),
         *("tables", "games_list", "controls", "clips", "figures", "folds"),
     )
 )

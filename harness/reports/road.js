@@ -193,7 +193,7 @@ function drawGoal(context) {
   }
 }
 
-/** A bar with a length of a round number of metres. */
+/** A bar with a length of a round number of metres. Returns the box of it and its text. */
 function drawScaleBar(context, camera) {
   const metres = [1, 2, 5, 10, 20, 50, 100, 200].find(each => each * camera.scale >= 50) ?? 500;
   const [long, x, y] = [metres * camera.scale, 12, camera.height - 10];
@@ -209,6 +209,7 @@ function drawScaleBar(context, camera) {
   context.textAlign = "left";
   context.textBaseline = "bottom";
   context.fillText(`${metres} m`, x + 4, y - 3);
+  return { x: x + long / 2, y: y - 8, halfX: long / 2 + 3, halfY: 11 };
 }
 
 const FONT = "11px system-ui, sans-serif";

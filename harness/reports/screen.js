@@ -106,23 +106,30 @@ class GameScreen {
     drawRoad(context, camera, ratio);
     for (const other of this.others) drawGhost(context, camera, ratio, other, time, this.oneRoad);
     if (reference) drawReference(context, camera, ratio, reference, time);
-    const labels = drawGame(context, camera, ratio, game, shown, true);
-    if (reference) drawReferenceNames(context, camera, reference, time, labels);
-    drawScaleBar(context, camera);
-    if (ended) this.drawEnded(context, width, reference);
+    drawGame(context, camera, ratio, game, shown);
+    const texts = [drawScaleBar(context, camera)];
+    if (ended) texts.push(this.drawEnded(context, width, reference));
+    drawNames(context, camera, this.names(shown, time, reference), texts);
     const [x, y] = camera.place(0, 0);
     this.view.dataset.camera = [x, y, camera.scale].map(value => value.toFixed(4)).join(" ");
     this.strips?.draw(time);
     this.say(shown);
   }
 
+  /** The names of all cars that are drawn with one. */
+  names(shown, time, reference) {
+    const ghosts = this.oneRoad ? this.others.flatMap(other => ghostNames(this.camera, other, time)) : [];
+    const mended = reference ? referenceNames(this.camera, reference, time) : [];
+    return [...playerNames(this.camera, this.game, shown), ...mended, ...ghosts];
+  }
+
+  /** Say when the game ended. Returns the box of the text. */
   drawEnded(context, width, reference) {
     context.font = `600 ${FONT}`;
-    context.textAlign = "right";
-    context.textBaseline = "top";
-    context.fillStyle = palette.ink;
-    const after = reference ? "; the others are taken to go on" : "";
-    context.fillText(`ended at ${this.game.duration.toFixed(1)} s${after}`, width - 10, 8);
+    const text = `ended at ${this.game.duration.toFixed(1)} s${reference ? "; the others are taken to go on" : ""}`;
+    const halfX = context.measureText(text).width / 2 + LABEL.inset, box = { x: width - 5 - halfX, y: 14, halfX, halfY: LABEL.halfY };
+    drawLabel(context, { text, colour: palette.ink, box });
+    return box;
   }
 
   /** The values of the moment as text. */

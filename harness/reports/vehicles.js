@@ -2,8 +2,8 @@
 
 const TRAIL_S = 4, GHOSTS_S = 1, BURST_S = 0.35;
 
-/** Draw a game at a time, from bottom to top: trails, background traffic, players, contacts. Returns the boxes of labels. */
-function drawGame(context, camera, ratio, game, time, labels) {
+/** Draw a game at a time, from bottom to top: trails, background traffic, players, contacts. */
+function drawGame(context, camera, ratio, game, time) {
   camera.inMetres(context, ratio, () => {
     for (const track of game.players) drawHidden(context, game, track, time);
     for (const track of game.players) drawTrail(context, camera, game, track, time);
@@ -19,7 +19,6 @@ function drawGame(context, camera, ratio, game, time, labels) {
       if (time >= touch.time - 1e-6) drawBurst(context, camera, touch, time - touch.time);
     }
   });
-  return labels ? drawLabels(context, camera, game, time) : [];
 }
 
 /** Draw the players of another game of the same start as outlines; `filled` where no second road shows them. */
@@ -30,7 +29,6 @@ function drawGhost(context, camera, ratio, game, time, filled) {
       if (pose) drawOutline(context, camera, track, pose, colourOf(track), filled);
     }
   });
-  if (filled) drawGhostNames(context, camera, game, time);
 }
 
 /** A car as a dashed outline. */
@@ -59,35 +57,8 @@ function drawReference(context, camera, ratio, reference, time) {
   });
 }
 
-/** Name them beside their cars, where that covers none of the boxes of labels. */
-function drawReferenceNames(context, camera, reference, time, labels) {
-  const poses = reference.players.map(track => ({ track, pose: poseAt(reference, track, time) })).filter(each => each.pose);
-  poses.sort((a, b) => b.pose.y - a.pose.y);
-  for (const [place, { track, pose }] of poses.entries()) {
-    const [x, y] = camera.place(pose.x, pose.y), half = reach(camera, track, pose) * (place || poses.length < 2 ? 1 : -1);
-    const name = track.name === "ego" ? reference.driver : nameOf(reference, track);
-    const boxes = [half, -half, 1.7 * half, -1.7 * half, 2.4 * half].map(far => labelBox(context, camera, name, x, y + far));
-    const box = boxes.find(each => labels.every(label => areApart(each, label))) ?? boxes[0];
-    drawLabel(context, box, referenceColour(track));
-    labels.push(box);
-  }
-}
-
 function referenceColour(track) {
   return track.name === "ego" ? palette.mended : palette["non-ego"];
-}
-
-function drawGhostNames(context, camera, game, time) {
-  context.font = FONT;
-  context.textAlign = "center";
-  context.textBaseline = "middle";
-  context.fillStyle = palette.ink;
-  for (const track of game.players) {
-    const pose = poseAt(game, track, Math.min(time, game.duration));
-    if (!pose) continue;
-    const [x, y] = camera.place(pose.x, pose.y), up = game.players.some(each => poseAt(game, each, time)?.y < pose.y) ? -1 : 1;
-    context.fillText(`${nameOf(game, track)} (${game.arm.split("_vs_")[0]})`, x, y + up * (track.size[1] / 2 * camera.scale + 31));
-  }
 }
 
 function colourOf(track) {
@@ -232,50 +203,4 @@ function drawBurst(context, camera, touch, since) {
     context.lineTo(touch.x + far * Math.cos(angle), touch.y + far * Math.sin(angle));
   }
   context.stroke();
-}
-
-/** Names beside the players' cars: above the upper car, below the other. Returns their boxes. */
-function drawLabels(context, camera, game, time) {
-  const poses = game.players.map(track => ({ track, pose: poseAt(game, track, time) })).filter(each => each.pose);
-  poses.sort((a, b) => b.pose.y - a.pose.y);
-  return poses.map(({ track, pose }, place) => {
-    const half = reach(camera, track, pose);
-    const [x, y] = camera.place(pose.x, pose.y);
-    const lapsed = valueAt(game, track, "lapsed", time) > 0;
-    const text = nameOf(game, track) + (lapsed ? " · not looking" : "");
-    const box = labelBox(context, camera, text, x, y + (place === 0 ? -half : half));
-    drawLabel(context, box, lapsed ? palette.lapse : palette.ink);
-    return box;
-  });
-}
-
-/** Pixels from a car's middle to a label above or below it. */
-function reach(camera, track, pose) {
-  const [length, width] = track.size, turned = Math.abs(Math.sin(pose.heading));
-  return (turned * length + (1 - turned) * width) / 2 * camera.scale + 13;
-}
-
-/** Where a label is drawn whose middle is at a point, moved into the picture. */
-function labelBox(context, camera, text, x, y) {
-  context.font = `600 ${FONT}`;
-  const wide = context.measureText(text).width / 2 + 5;
-  return { text, wide, x: Math.min(Math.max(x, wide), camera.width - wide), y };
-}
-
-function areApart(one, other) {
-  return Math.abs(one.x - other.x) > one.wide + other.wide || Math.abs(one.y - other.y) > 17;
-}
-
-function drawLabel(context, { text, wide, x, y }, colour) {
-  context.font = `600 ${FONT}`;
-  context.textAlign = "center";
-  context.textBaseline = "middle";
-  context.fillStyle = palette.paper;
-  context.globalAlpha = 0.82;
-  context.beginPath();
-  context.roundRect(x - wide, y - 8, 2 * wide, 16, 4);
-  context.fill();
-  context.globalAlpha = 1;
-  context.fillStyle = colour;
-  context.fillText(text, x, y);
 }

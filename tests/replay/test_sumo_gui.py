@@ -51,15 +51,15 @@ def photograph(folder: Path, screen: str, steps: list[int]) -> list[np.ndarray]:
     (folder / "view.xml").write_text(settings.replace("</viewsettings>", taken + "</viewsettings>"))
     command = [str(find_sumo_gui()), "-c", str(folder / "scene.sumocfg"), "--quit-on-end"]
     environment = os.environ | {"DISPLAY": screen}
-    for _ in range(5):  # SUMO-GUI dies of SIGSEGV or does not end now and then
+    for _ in range(5):  # SUMO-GUI dies of SIGSEGV, does not end, or takes pictures of one pixel now and then
         with contextlib.suppress(subprocess.TimeoutExpired):
             done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
             if done.returncode >= 0:
                 assert done.returncode == 0, done.stderr
-                break
-    else:
-        pytest.fail("SUMO-GUI died or did not end in five attempts")
-    return [np.asarray(Image.open(file).convert("RGB")).astype(int) for file in files]
+                pictures = [np.asarray(Image.open(file).convert("RGB")).astype(int) for file in files]
+                if all(picture.size > 3 for picture in pictures):
+                    return pictures
+    pytest.fail("SUMO-GUI died, did not end or took no picture in five attempts")
 
 
 def place(mask: np.ndarray, trace: pd.DataFrame, net: Path) -> tuple[float, float]:
@@ -86,6 +86,22 @@ def test_gui__shows_both_cars_where_the_trace_has_them(
         x_m, y_m = place(mask, trace, merge_net)
         assert abs(x_m - expected.loc[player, "x_m"]) < 1.5
         assert abs(y_m - expected.loc[player, "y_m"]) < 1.0
+
+
+def test_gui__prints_the_label_of_a_contact_on_white_above_the_road(
+    screen: str, merge_net: Path, tmp_path: Path
+) -> None:
+    trace = collision_game()
+    (picture,) = photograph(write(trace, merge_net, tmp_path / "replay"), screen, [15])
+    found = contacts(trace, types_of_vehicles(trace, [merge_net.with_name("merge.rou.xml")]), RAILS)
+    view = choose_view(trace, found)
+    height, width = picture.shape[:2]
+    per_px = max(view.width_m / width, view.height_m / height)
+    column = round(0.5 * width + (found[0].x_m - view.x_m) / per_px)
+    row = round(0.5 * height - (found[0].y_m + 8.0 - view.y_m) / per_px)
+    around = picture[row + 8 : row + 20, column - 20 : column + 20]  # SUMO-GUI prints it below its place
+    assert (around.min(-1) > 240).mean() > 0.4
+    assert (around.max(-1) < 120).mean() > 0.05  # the letters
 
 
 def test_gui__follows_the_ego_and_halts_at_the_contact(
