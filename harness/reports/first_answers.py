@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.evaluation.comparisons.preventability import prevented_examples
+from harness.evaluation.comparisons.preventability import REGULATION, TAKES_OVER, prevented_examples
 from harness.evaluation.competence import WITHHELD, Verdict
 from harness.evaluation.rule_book.causes import cause_lines
 from harness.evaluation.strategies import PAPER_ROUNDS, NaiveEgo, against_persona, round_of
@@ -48,13 +48,14 @@ def first_answers(tables: RunTables, steps: Sequence[NextStep]) -> list[FirstAns
         return []
     focus = focus_of(tables)
     told = list(_told(focus, personas, tables))
+    prevented, driver = next((each for _, arms in told for each in _prevented_games(arms, tables)), ("", REGULATION))
     answers = [
         FirstAnswer(question="Why does it fail?", lines=list(_why(focus, tables))),
         FirstAnswer(
             question="Could it have been prevented?",
             lines=[line for where, arms in told for line in _prevented(where, arms, tables)],
-            game=next((game for _, arms in told for game in _prevented_games(arms, tables)), ""),
-            watch="Watch how a reference driver prevents one",
+            game=prevented,
+            watch=f"Watch how the {TAKES_OVER[driver]} prevents one",
         ),
         FirstAnswer(question="How severe is it?", lines=list(_severe(focus, told, tables))),
         FirstAnswer(
@@ -131,11 +132,12 @@ def _prevented(where: str, arms: Mapping[str, str], tables: RunTables) -> Iterat
         yield f"The failures of the {made}{where} are not judged."
 
 
-def _prevented_games(arms: Mapping[str, str], tables: RunTables) -> Iterator[str]:
-    """The keys of the games that show how a reference driver prevents a failure."""
-    for (arm, seed), episode in prevented_examples(tables.takeovers).items():
+def _prevented_games(arms: Mapping[str, str], tables: RunTables) -> Iterator[tuple[str, str]]:
+    """The keys of the games that show how a reference driver prevents a failure, each with this driver: that of UN R157
+    where it prevents one, or else another."""
+    for (arm, seed), (episode, driver) in prevented_examples(tables.takeovers).items():
         if arm in arms:
-            yield key(arm, seed, episode)
+            yield key(arm, seed, episode), driver
 
 
 def _severe(focus: Focus | None, told: Sequence[Told], tables: RunTables) -> Iterator[str]:

@@ -16,6 +16,7 @@ from harness.evaluation.strategies import (
     against_persona,
 )
 from harness.evaluation.tables import table_of
+from harness.reports.embedding import key
 from harness.reports.failure_table import TAKES_OVER, WORST_KNOWN, failure_table
 from harness.reports.first_answers import first_answers
 from harness.reports.focus import focus_of
@@ -218,6 +219,15 @@ def test_answers__a_failure_without_a_conflict_is_judged_from_the_start_only():
     assert given["Could it have been prevented?"][0] == (
         "Of the failures against speedy the driver of UN R157 prevents: naive ego 1 of 18 from the start."
     )
+
+
+def test_answers__name_the_reference_driver_that_is_watched():
+    game = {"arm": "naive_vs_speedy", "seed": 1, "episode": 4, "driver": "rss"}
+    pose = {"player": "ego", "step": 8, "x_m": 0.0, "y_m": 0.0, "heading_rad": 0.0}
+    taken_over = table_of("takeovers", [game | pose])
+    run = run_of(preventability=table_of("preventability", [judged(failures=18, prevented=0)]), takeovers=taken_over)
+    given = {each.question: each for each in first_answers(run, next_steps(run))}["Could it have been prevented?"]
+    assert (given.game, given.watch) == (key("naive_vs_speedy", 1, 4), "Watch how the RSS driver prevents one")
 
 
 def test_answers__about_the_ordinary_driver_are_not_about_a_persona():

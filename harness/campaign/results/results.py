@@ -39,7 +39,7 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
         boundaries=found_boundaries(folder, run.scene),
     )
     with doing(console, "writing the report"):
-        prevented = [(*arm, episode) for arm, episode in prevented_examples(tables.takeovers).items()]
+        prevented = [(*arm, episode) for arm, (episode, _) in prevented_examples(tables.takeovers).items()]
         shown_first, takeovers = [*examples(tables.attribution), *prevented], takeovers_of(tables.takeovers)
         games = recorded_games(tables.episodes, tables.arms, folder.traces_of_arm, run.scene, shown_first, takeovers)
         paths = list(failing_paths(tables.episodes, tables.arms, folder.traces_of_arm, run.scene))

@@ -69,12 +69,12 @@ def by_regulation(counts: pd.DataFrame, arm: str) -> list[Mapping[Any, Any]]:
     return counts[(counts["arm"] == arm) & (counts["driver"] == REGULATION)].to_dict("records")
 
 
-def prevented_examples(takeovers: pd.DataFrame) -> dict[tuple[str, int], int]:
+def prevented_examples(takeovers: pd.DataFrame) -> dict[tuple[str, int], tuple[int, str]]:
     """An episode of each arm and training seed in which a reference driver prevents the collision from the conflict on,
-    the driver of the regulation if it prevents one. `takeovers` is the table of this name."""
+    and that driver: the one of the regulation if it prevents one. `takeovers` is the table of this name."""
     first = takeovers.assign(other=takeovers["driver"] != REGULATION).sort_values(["other", "episode"], kind="stable")
     rows = first.drop_duplicates(["arm", "seed"]).sort_index()
-    return {(str(row.arm), int(row.seed)): int(row.episode) for row in rows.itertuples()}
+    return {(str(row.arm), int(row.seed)): (int(row.episode), str(row.driver)) for row in rows.itertuples()}
 
 
 def sentences_of(counts: pd.DataFrame, games: pd.DataFrame, arm: str) -> dict[int, list[str]]:

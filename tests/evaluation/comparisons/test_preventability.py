@@ -110,5 +110,8 @@ def test_examples__are_of_the_driver_of_the_regulation_where_it_prevents_any() -
         for seed, episode, driver in games
         for step in (8, 9)
     ]
-    assert prevented_examples(table_of("takeovers", rows)) == {("naive_vs_speedy", 1): 7, ("naive_vs_speedy", 2): 5}
+    assert prevented_examples(table_of("takeovers", rows)) == {
+        ("naive_vs_speedy", 1): (7, REGULATION),
+        ("naive_vs_speedy", 2): (5, "fuzzy"),
+    }
     assert prevented_examples(table_of("takeovers")) == {}
