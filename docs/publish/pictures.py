@@ -2,13 +2,14 @@
 
     python docs/publish/pictures.py [NAME...]
 
-takes those of a shipped scene (drawn by `harness scene show`), of the published report (`report`), or of a tutorial
-after its steps, whose printed output it writes into the tutorial's page; without a name, all of them. It needs
-Chromium, Xvfb and the extra `dev`.
+takes those of a shipped scene (drawn by `harness scene show`), of a published report, or of a tutorial after its
+steps, whose printed output it writes into the tutorial's page; without a name, all of them. It needs Chromium, Xvfb
+and the extra `dev`.
 """
 
 from __future__ import annotations
 
+import argparse
 import io
 import shutil
 import subprocess
@@ -108,12 +109,18 @@ CONTINUED = {"from-a-failure-to-a-regression-test": "your-own-ego"}
 
 def main() -> None:
     """Take every picture."""
+    names = [*SCENES, *PUBLISHED, *TUTORIALS]
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"one of {', '.join(names)}")
+    asked = parser.parse_args().names
+    if unknown := [each for each in asked if each not in names]:
+        parser.error(f"there are no pictures of {', '.join(unknown)}: choose from {', '.join(names)}")
     browser_file = next((found for name in CHROMIUM if (found := shutil.which(name))), None)
     if browser_file is None:
         sys.exit(f"none of {', '.join(CHROMIUM)} is installed")
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=browser_file, args=["--no-sandbox"])
-        for name in sys.argv[1:] or [*SCENES, *PUBLISHED, *TUTORIALS]:
+        for name in asked or names:
             for picture, page in pages_of(name, Path(folder)):
                 size: ViewportSize = {"width": picture.width, "height": picture.height}
                 tab = browser.new_page(viewport=size, reduced_motion="reduce")  # nothing plays by itself
