@@ -71,9 +71,13 @@ def to_learn(tables: RunTables) -> Iterator[NextStep]:
 
 
 def _watch(tables: RunTables) -> Iterator[NextStep]:
-    """The worst game of the arm that matters most."""
+    """The worst game of the arm that matters most; without games, how to have them."""
     focus = focus_of(tables)
     if focus is None:
+        return
+    if tables.is_from_tables:
+        sentence = f"See how {focus.happens}: play the games, which are not published, once more."
+        yield NextStep(sentence=sentence, command=command_of(tables.manifest))
         return
     games = tables.games_of(focus.arm)
     if focus.check is not None and (breaking := _BREAKING.get(focus.check.bound)):

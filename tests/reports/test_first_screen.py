@@ -194,6 +194,12 @@ def answers(run):
     return {each.question: [line.replace(NO_SPACE, " ") for line in each.lines] for each in given}
 
 
+def test_next_steps__of_a_run_without_games_begin_with_playing_them():
+    step = next_steps(run_of(is_from_tables=True))[0]
+    assert step.sentence.endswith("play the games, which are not published, once more.")
+    assert (step.command.split()[:2], step.game) == (["harness", "campaign"], "")
+
+
 def test_answers__say_how_often_each_ego_fails_and_what_retraining_costs():
     run = run_of(preventability=table_of("preventability", [judged(failures=18, prevented=12)]))
     given = answers(run)
