@@ -219,9 +219,10 @@ def is_named_of_a_trait(arm: str, persona: str) -> bool:
 
 
 def is_named_of_the_naive_ego(arm: str) -> bool:
-    """Whether the ego of an arm is a `NaiveEgo`, by the name of the arm."""
-    naive = strategy_name(NaiveEgo())
-    return arm.startswith((NAIVE_ALONE.name, f"{naive}_vs_"))
+    """Whether a `NaiveEgo` drives in an arm, by the name of the arm: not its best response."""
+    naive, answers = strategy_name(NaiveEgo()), [f"_{role}_response" for role in ROLES]
+    is_of_response = arm.endswith(answers[EGO]) and not arm.endswith(answers[NON_EGO])
+    return arm.startswith((NAIVE_ALONE.name, f"{naive}_vs_")) and not is_of_response
 
 
 def player_of(strategy: Strategy) -> int:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from harness.evaluation.strategies import (
@@ -90,6 +92,7 @@ def test_arm__a_best_response_belongs_to_its_pair() -> None:
         (Arm(ego=OtherEgo(driver="naive_seed1"), non_ego=SPEEDY), "speedy", False, False),
         (Arm(ego=RETRAINED, non_ego=SPEEDY), "speedy", False, False),
         (RESPONSE, "speedy", False, True),
+        (replace(RESPONSE, best_response_of=EGO), "speedy", False, False),
         (Arm(ego=LATER, non_ego=PersonaNonEgo(persona="speedy", round=3)), "speedy", False, False),
         (persona_alone("speedy", ATTENTIVE), "speedy", False, False),
         (Arm(ego=NaiveEgo(), non_ego=PersonaNonEgo(persona="speedy", borrowed=ATTENTIVE)), "speedy", True, True),
@@ -98,4 +101,4 @@ def test_arm__a_best_response_belongs_to_its_pair() -> None:
 )
 def test_name_of_an_arm__says_what_the_arm_does(arm: Arm, persona: str, of_a_trait: bool, of_the_naive: bool) -> None:
     assert is_named_of_a_trait(arm.name, persona) == arm.is_of_a_trait == of_a_trait
-    assert is_named_of_the_naive_ego(arm.name) == isinstance(arm.ego, NaiveEgo) == of_the_naive
+    assert is_named_of_the_naive_ego(arm.name) == of_the_naive
