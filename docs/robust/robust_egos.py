@@ -55,7 +55,7 @@ def persons(run: Run) -> None:
         naive, robust = (games[games["arm"] == arm] for arm in arms)
         of_seeds = [own.groupby("seed")["ego_failed"].mean() for own in (naive, robust)]
         worse = f"{int((of_seeds[1] > of_seeds[0]).sum())} of {len(of_seeds[1])}"
-        known = "" if person in ("nobody", "sumo") else ("yes" if person in met else "no")
+        known = "" if person == "nobody" else ("yes" if person in met else "no")
         rates = rate(naive["ego_failed"]), rate(robust["ego_failed"]), f"{of_seeds[1].max():.1%}"
         print(f"| {' | '.join((person, known, *rates, worse))} |")
 

@@ -111,9 +111,9 @@ class Retraining(Document):
     """Starts of the games against the non-ego. `uniform`: drawn from the scene's ranges. `regret`: half of them are
     replays of starts in which the ego earns less than a reference driver or the naive ego did."""
     against: list[Name] = Field([], max_length=50)
-    """Names of personas. One more ego, `robust`, is retrained against all of them, in equal shares of its games, and
-    with a budget multiplied by their number. It is also assessed against the other personas of the campaign, which it
-    has not met in training."""
+    """Names of personas, or `sumo`: SUMO's own driver. One more ego, `robust`, is retrained against all of them, in
+    equal shares of its games, and with a budget multiplied by their number. It is also assessed against the other
+    personas of the campaign, which it has not met in training."""
 
 
 class Reconfiguration(Document):

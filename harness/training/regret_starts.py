@@ -167,7 +167,7 @@ def replays_of(spec: TrainingSpec, scores: RegretScores | None) -> RegretReplays
 
 
 def _people(spec: TrainingSpec) -> Sequence[Mixture | None]:
-    (place,) = spec.places
+    place = spec.places[0]
     assert place.player == EGO, "only an ego has reference drivers"
     return place.drivers[1:]
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import floor
 
 from harness.config.persona import Persona
 from harness.config.training import Training
@@ -32,6 +34,8 @@ class LearningPlace:
     """The learner's place on the players' axis."""
     drivers: tuple[Mixture | None, ...]
     """[P]; None: the learner's own place, or no one drives there."""
+    share: float = 1.0
+    """Its share of the games, relative to those of the other places."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +46,7 @@ class TrainingSpec:
     """Of the learner: its payoff and human factors. Of several, each game has one, in equal shares, and the learner has
     as many inputs more, which say which."""
     places: tuple[LearningPlace, ...]
-    """Each has an equal part of the games. The first one is in the scene of the campaign."""
+    """The first one is in the scene of the campaign, and the only one with replays."""
     alone_share: float
     """Share of the games without other players."""
     attentive_share: float
@@ -73,12 +77,11 @@ class TrainingSpec:
 def open_games(spec: TrainingSpec) -> JoinedVecEnv:
     """The games of a training; each of its places has an arena of its own, and they share SUMO where they can. Raises
     SimulationError if SUMO fails."""
-    games, places = spec.settings.games, len(spec.places)
+    games = games_of_places(spec.settings.games, [place.share for place in spec.places])
     parts = []
-    for number, place in enumerate(spec.places):
+    for place, own_games in zip(spec.places, games, strict=True):
         seats = [seats_of(each, paid=False) for each in place.drivers]
         seats[place.player] = tuple(Seat(None, each.payoff) for each in spec.personas)
-        own_games = games // places + (number < games % places)
         parts.append(SeatedGames(scene=place.scene, games=own_games, seats=seats))
     environments = []
     for number, arena in enumerate(open_arenas(parts, seed=seed_of(*spec.parts, "sumo") % 2**31)):
@@ -87,6 +90,23 @@ def open_games(spec: TrainingSpec) -> JoinedVecEnv:
         scale = spec.settings.payoff_scale
         environments.append(ArenaVecEnv(arena, place.player, starts, *of_place, payoff_scale=scale))
     return JoinedVecEnv(environments)
+
+
+def games_of_places(games: int, shares: Sequence[float]) -> list[int]:
+    """The games in each place, which add up to `games`: at least one in each, the others by the largest remainders,
+    among equal ones those of the first places.
+
+    >>> games_of_places(64, [5.0, 1.0])
+    [53, 11]
+    """
+    exact = [games * share / sum(shares) for share in shares]
+    whole = [max(1, floor(each)) for each in exact]
+    by_remainder = sorted(range(len(shares)), key=lambda place: whole[place] - exact[place])
+    while sum(whole) > games:
+        whole[whole.index(max(whole))] -= 1
+    for place in by_remainder[: games - sum(whole)]:
+        whole[place] += 1
+    return whole
 
 
 def _parts_of(number: int, *parts: str | int) -> tuple[str | int, ...]:
@@ -101,10 +121,11 @@ def sample(
     *parts: str | int,
     replays: Replays | None = None,
 ) -> None:
-    """Draw the next games from these parts, `steps` after the start of the training; `replays` are of a learner with
-    one place."""
+    """Draw the next games from these parts, `steps` after the start of the training; `replays` are those of the first
+    place."""
     for number, (place, each) in enumerate(zip(spec.places, environment.environments, strict=True)):
-        each.sample_from(_start_distribution(spec, place, steps), *_parts_of(number, *parts), replays=replays)
+        of_place = None if number else replays
+        each.sample_from(_start_distribution(spec, place, steps), *_parts_of(number, *parts), replays=of_place)
 
 
 def _start_distribution(spec: TrainingSpec, place: LearningPlace, steps: int) -> StartDistribution:

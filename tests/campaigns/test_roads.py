@@ -6,12 +6,18 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from harness.game.roles import EGO
+from harness.config.persona import Persona
+from harness.config.toml_reading import read_document
+from harness.drivers.mixture import mixture_of
+from harness.drivers.sumo import SumoDriver
+from harness.game.roles import EGO, NON_EGO
 from harness.road.scene.open_scene import open_scene
 from harness.training.training_games import LearningPlace, open_games
-from tests.support.tiny import PAPER_MERGE, finished
+from tests.support.rollouts import Steady
+from tests.support.tiny import CAREFUL, PAPER_MERGE, finished
 from tests.support.trainings import naive_ego
 
 NAMES = ("naive", "speedy", "retrained_speedy")
@@ -32,6 +38,25 @@ def test_campaign__its_egos_learn_on_other_roads_and_its_people_do_not() -> None
     )
     hashes = json.loads((run / "manifest.json").read_text())["hashes"]
     assert "merge.net.xml" in {Path(each).name for each in hashes}
+
+
+def test_games__beside_sumos_driver_too__are_in_parts_by_share_and_only_sumos_driver_is_left_to_sumo() -> None:
+    spec, persona = naive_ego(open_scene(PAPER_MERGE)), read_document(CAREFUL, Persona)
+    beside = ((Steady(), 3.0), (SumoDriver(), 1.0))
+    places = [replace(spec.places[0], drivers=(None, mixture_of(each, persona)), share=share) for each, share in beside]
+    environment = open_games(replace(spec, places=tuple(places), alone_share=0.0))
+    try:
+        environment.reset()
+        arenas = [each.arena for each in environment.environments]
+        assert [arena.state.present.all(1).sum() for arena in arenas] == [6, 2]
+        before = [arena.state.speed_mps[:, NON_EGO].copy() for arena in arenas]
+        for _ in range(3):
+            environment.step(np.zeros((8, 2), dtype=np.float32))
+        gained_mps = [arena.state.speed_mps[:, NON_EGO] - was for arena, was in zip(arenas, before, strict=True)]
+        assert (gained_mps[0] == 0.0).all()
+        assert (gained_mps[1] != 0.0).all()
+    finally:
+        environment.close()
 
 
 def test_games__of_a_training_are_in_equal_parts_on_its_roads() -> None:

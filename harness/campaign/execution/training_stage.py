@@ -11,7 +11,7 @@ import pandas as pd
 
 from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import StageRun
-from harness.campaign.plan.planned_drivers import SumoDriven, description, driver_in
+from harness.campaign.plan.planned_drivers import SumoDriven, by_control, description, driver_in
 from harness.campaign.plan.stages import TrainingStage
 from harness.campaign.plan.strategy_stages import training_settings
 from harness.campaign.storage.training_curves import CHECKPOINT
@@ -83,10 +83,15 @@ def _spec(stage: TrainingStage, run: StageRun, scene: OpenScene) -> TrainingSpec
 
 
 def _places(stage: TrainingStage, players: PlayerFactory) -> tuple[LearningPlace, ...]:
-    """Where the learner drives. An ego has one place. A person learns in every place of the non-egos in turn: the other
-    places are driven by SUMO, which no persona has trained."""
+    """Where the learner drives. An ego has one place, and one more for games beside SUMO's driver if it meets others as
+    well. A person learns in every place of the non-egos in turn: the other places are driven by SUMO, which no persona
+    has trained."""
     if stage.learner == EGO:
-        return (LearningPlace(scene=players.scene, player=EGO, drivers=(None, *players.people(stage.opponent))),)
+        sides = ((players.people(side), share) for side, share in by_control(stage.opponent))
+        return tuple(
+            LearningPlace(scene=players.scene, player=EGO, drivers=(None, *people), share=share)
+            for people, share in sides
+        )
     places = []
     for learner in range(1, len(players.scene.world.roles)):
         drivers = [players.player(driver_in(stage.opponent, 0)), *players.people((SumoDriven(),))]

@@ -26,7 +26,7 @@ _Found: TypeAlias = Iterator[tuple[str, str, str]]
 
 def check_people(file: Path, document: Campaign, people: int) -> None:
     """Raises UsageError for everything in a campaign that does not fit a scene with this number of people."""
-    _refuse(file, _people(document, people))
+    _refuse(file, (*_people(document, people), *_places(document, people)))
 
 
 def check_roads(file: Path, document: Campaign, alike: Sequence[bool]) -> None:
@@ -67,9 +67,6 @@ def _people(document: Campaign, people: int) -> _Found:
     for key in (key for key, given in of_two.items() if given and people > 1):
         message = f"is about games of two players, and the scene has {people} people"
         yield key, message, "leave it out, or take a scene with one [[non_ego]]"
-    if document.policies is None and document.training.games < people:
-        message = f"{document.training.games} games at once, and a person learns in {people} places"
-        yield "training.games", message, f"give at least {people}"
 
 
 def _roads(document: Campaign, alike: Sequence[bool]) -> _Found:
@@ -79,13 +76,25 @@ def _roads(document: Campaign, alike: Sequence[bool]) -> _Found:
         yield "roads", "no ego is trained", "leave out this key, or train the ego"
     if document.retraining.starts != Retraining().starts:
         yield "retraining.starts", "regret is measured on one road", "leave out this key or `roads`"
-    if len(alike) >= (games := document.training.games):
-        message = f"{games} games at once, and each road needs one, that of the scene too"
-        yield "training.games", message, f"give at least {len(alike) + 1}"
     for written, is_alike in zip(document.roads, alike, strict=True):
         if not is_alike:
             message = f"{written!r}: its players, or the length of its steps, are not those of the scene"
             yield "roads", message, "name scenes that `harness scene vary` made of this one"
+
+
+def _places(document: Campaign, people: int) -> _Found:
+    """Fewer games at once than places in which a player learns."""
+    if document.policies is not None:
+        return
+    needed = {f"a person learns in {people} places": people}
+    if document.ego.driver == LEARNED:
+        against = document.retraining.against
+        roads, beside_sumo = len(document.roads) + 1, SUMO in against and len(against) > 1
+        too = ", on each beside SUMO's driver too" if beside_sumo else ""
+        needed[f"an ego learns on {roads} road{'s' * (roads > 1)}{too}"] = roads * (2 if beside_sumo else 1)
+    reason, least = max(needed.items(), key=lambda each: each[1])
+    if document.training.games < least:
+        yield "training.games", f"{document.training.games} games at once, and {reason}", f"give at least {least}"
 
 
 def _personas(document: Campaign, personas: Sequence[str], traits: PersonTraits) -> _Found:
@@ -93,9 +102,10 @@ def _personas(document: Campaign, personas: Sequence[str], traits: PersonTraits)
     named |= {f"crowd[{k}].personas": list(dict.fromkeys(each.personas)) for k, each in enumerate(document.crowd)}
     named |= {"retraining.against": document.retraining.against, "rounds.personas": document.rounds.personas}
     for key, names in named.items():
+        known = [*personas, SUMO] if key == "retraining.against" else personas
         for name in names:
-            if name not in personas:
-                yield key, f"there is no persona {name!r}", nearest(name, personas)
+            if name not in known:
+                yield key, f"there is no persona {name!r}", nearest(name, known)
     taken = [*personas, traits.baseline]
     mixed = [(f"population[{k}]", each.name) for k, each in enumerate(document.population)]
     mixed += [(f"crowd[{k}]", each.name) for k, each in enumerate(document.crowd)]

@@ -101,6 +101,21 @@ def driver_in(side: Side, place: int) -> PlannedDriver | None:
     return side[place % len(side)] if side else None
 
 
+def by_control(side: Side) -> tuple[tuple[Side, float], ...]:
+    """A side, as one or two sides of which the harness drives all members or SUMO does, each with its share of the
+    games. A player's control mode is the same in all games of an arena."""
+    match side:
+        case (FixedMixture(members=members, shares=shares),) if SumoDriven() in members:
+            people = [pair for pair in zip(members, shares, strict=True) if pair[0] != SumoDriven()]
+            taken_over = FixedMixture(
+                members=tuple(each for each, _ in people), shares=tuple(share for _, share in people)
+            )
+            of_people = sum(taken_over.shares)
+            return ((taken_over,), of_people), ((SumoDriven(),), sum(shares) - of_people)
+        case _:
+            return ((side, 1.0),)
+
+
 def members_of(*drivers: PlannedDriver) -> tuple[PlannedMember, ...]:
     """The drivers that may play: the members of mixtures, choices and shields, or the drivers themselves."""
     several = FixedMixture | EquilibriumMixture | BestOf | Shielded

@@ -86,8 +86,9 @@ class SeedStages:
                 return (self._driver(strategy),)
 
     def mixture(self, shares: Mapping[str, float]) -> PlannedDriver:
-        """Personas by their shares, one of which is drawn for each game; of one persona, its driver."""
-        members = tuple(self._driver(PersonaNonEgo(persona=name)) for name in shares)
+        """Personas, or `sumo`, by their shares, one of which is drawn for each game; of one persona, its driver."""
+        people = (SumoNonEgo() if name == SUMO else PersonaNonEgo(persona=name) for name in shares)
+        members = tuple(map(self._driver, people))
         return members[0] if len(members) == 1 else FixedMixture(members=members, shares=tuple(shares.values()))
 
     def pair(self, ego: EgoStrategy, non_ego: PersonaNonEgo | RoundAnswer) -> AssessmentStage:

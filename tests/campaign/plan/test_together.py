@@ -6,6 +6,7 @@ from typing import Any
 
 from harness.campaign.plan.paper_rounds import questions
 from harness.campaign.plan.plan import plan
+from harness.campaign.plan.planned_drivers import FixedMixture, SumoDriven, Trained, by_control
 from harness.campaign.plan.stages import AssessmentStage, ConditioningStage, TrainingStage
 from harness.campaign.plan.strategy_stages import training_settings
 from harness.config.traits import PersonTraits
@@ -39,6 +40,21 @@ def test_plan__the_budget_of_a_training_together_is_that_of_as_many_trainings() 
     }
     one = campaign.training.steps
     assert steps == {"naive-seed1": one, "people-seed1": 3 * one, "robust-seed1": 2 * one}
+
+
+def test_plan__an_ego_retrained_against_sumos_driver_too_meets_it_in_an_equal_share() -> None:
+    asked = {**ASKED, "retraining": {"against": ["anna", "bert", "sumo"]}}
+    robust = stages_of(*PERSONAS, **asked)["robust"]
+    assert isinstance(robust, TrainingStage)
+    people = tuple(Trained(stage=f"{name}-seed1", persona=name) for name in ("anna", "bert"))
+    assert robust.opponent == (FixedMixture(members=(*people, SumoDriven()), shares=(1.0, 1.0, 1.0)),)
+    assert by_control(robust.opponent) == (
+        ((FixedMixture(members=people, shares=(1.0, 1.0)),), 2.0),
+        ((SumoDriven(),), 1.0),
+    )
+    assert by_control(people) == ((people, 1.0),)
+    campaign = campaign_of(*PERSONAS, **asked)
+    assert training_settings(campaign, robust).steps == 3 * campaign.training.steps
 
 
 def test_plan__the_arms_are_those_of_personas_that_learn_alone() -> None:
