@@ -157,6 +157,7 @@ FALSIFICATION = (
 
 NOBODY, SUMO_DRIVER = "nobody", "sumo"
 """The column `person` of arms without a persona."""
+UNTRAINED = (NOBODY, SUMO_DRIVER)
 LEAGUE_EGO = (
     Column("ego", TEXT, "The ego of the league."),
     Column("shield", TEXT, "The rule of the shield around it (docs/shield.md): `rss`. Empty: it has none."),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from harness.evaluation.comparisons.tied_ranks import with_shield
-from harness.evaluation.result_columns import NOBODY, SUMO_DRIVER
+from harness.evaluation.result_columns import SUMO_DRIVER, UNTRAINED
 from harness.reports.failure_table import ORDINARY, FailureCell
 from harness.reports.numbers import NO_SPACE, interval, number, percent
 from harness.reports.page_template import environment_of
@@ -32,8 +32,8 @@ def render_league(ego: str, table: pd.DataFrame, addresses: Sequence[str], faile
     rows = table.to_dict("records")
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
     shields = sorted({row["shield"] for row in rows})
-    people = sorted({row["person"] for row in rows} - {NOBODY, SUMO_DRIVER})
-    columns = [each for each in (NOBODY, SUMO_DRIVER, *people) if each in {row["person"] for row in rows}]
+    people = sorted({row["person"] for row in rows} - set(UNTRAINED))
+    columns = [each for each in (*UNTRAINED, *people) if each in {row["person"] for row in rows}]
     cells: dict[tuple[str, str, str], list[FailureCell]] = {}
     for row, address in zip(rows, addresses, strict=True):
         cells.setdefault((row["scene"], row["shield"], row["person"]), []).append(_cell(row, address))
@@ -67,7 +67,8 @@ def league_terminal(table: pd.DataFrame) -> Table:
         shown.add_column(heading, overflow="fold")
     for row in table.head(12).to_dict("records"):
         style = "dim" if row["reason"] else "red" if row["failure_rate"] > _MUCH else None
-        shown.add_row(*list(_texts(row))[:5], style=style)
+        scene, person, _, span, preventable, *_ = _texts(row)
+        shown.add_row(scene, person, _counts(row), span, preventable, style=style)
     return shown
 
 
@@ -122,7 +123,7 @@ def _counts(row: Mapping[Any, Any]) -> str:
 
 def _texts(row: Mapping[Any, Any]) -> Iterator[str]:
     yield with_shield(row["scene"], row["shield"])
-    yield person_in_words(row["person"])
+    yield person_in_words(row["person"]) + ("" if row["person"] in UNTRAINED else f", seed {row['seed']}")
     yield f"{percent(row['failure_rate'])} ({_counts(row)})"
     yield interval(row["failure_rate_low"], row["failure_rate_high"])
     yield percent(row["preventable_rate"])

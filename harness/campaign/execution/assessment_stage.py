@@ -88,13 +88,17 @@ class Segment:
 
 def carry_out_assessment(stage: AssessmentStage, run: StageRun, scene: OpenScene) -> tuple[dict[str, Any], list[Path]]:
     """Play an arm; the facts, and the files of its log. Raises as `PlayerFactory.arm` and `play_segments` do."""
-    folder, players = run.context.folder, PlayerFactory(context=run.context, scene=scene)
-    stage, choice = players.chosen(stage)
-    segments = segments_of(folder.segments(stage.id), run.context.document.assessment.episodes)
-    labels = _labels(stage)
-    play_segments(players.arm(stage), segments, labels, run)
+    folder, labels, choice = run.context.folder, _labels(stage), dict[str, Any]()
     played, traces = folder.work(stage.id) / PLAYED, folder.traces(stage.id)
-    join_segments(segments, played, traces, labels)
+    if stage.games_of:
+        write_csv(read_csv(folder.work(stage.games_of) / PLAYED).assign(**labels), played)
+        join_traces([folder.traces(stage.games_of)], traces, labels)
+    else:
+        players = PlayerFactory(context=run.context, scene=scene)
+        stage, choice = players.chosen(stage)
+        segments = segments_of(folder.segments(stage.id), run.context.document.assessment.episodes)
+        play_segments(players.arm(stage), segments, labels, run)
+        join_segments(segments, played, traces, labels)
     games = arm_tables(folder, stage.id, scene).episodes
     facts: dict[str, Any] = {"episodes": len(games), "errors": int((games["error"] != "").sum())}
     facts |= {"versions": [versions_of_numbers()], **choice}

@@ -41,7 +41,7 @@ def plan(
     nothing is selected.
     """
     seeds = [SeedStages(campaign=campaign, seed=seed, traits=traits) for seed in campaign.seeds]
-    stages = [stage for of in seeds for stage in _plan_seed(of, personas, tunable)]
+    stages = list(_with_games_once(stage for of in seeds for stage in _plan_seed(of, personas, tunable)))
     if campaign.policies is None:
         return stages
     return [each for each in stages if not isinstance(each, TrainingStage) or each.is_best_response]
@@ -60,6 +60,17 @@ def _plan_seed(of: SeedStages, personas: Sequence[str], tunable: bool) -> list[S
     stages += plan_attribution(of)
     stages += compared
     return list(dict.fromkeys(stages))
+
+
+def _with_games_once(stages: Iterable[Stage]) -> Iterator[Stage]:
+    """The stages, of which an arm without trained players has the games of the first training seed."""
+    first = dict[str, str]()
+    for stage in stages:
+        if isinstance(stage, AssessmentStage) and stage.is_untrained:
+            played = first.setdefault(stage.name, stage.id)
+            yield stage if played == stage.id else replace(stage, games_of=played)
+        else:
+            yield stage
 
 
 def _plan_responses(of: SeedStages, rounds: Sequence[PersonaRounds], stages: Iterable[Stage]) -> list[Stage]:

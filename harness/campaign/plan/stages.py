@@ -10,9 +10,11 @@ from typing import ClassVar, TypeAlias
 
 from harness.campaign.plan.planned_drivers import (
     EquilibriumMixture,
+    External,
     PlannedDriver,
     Reconfigured,
     Side,
+    SumoDriven,
     Trained,
     TrainedBefore,
     members_of,
@@ -186,6 +188,8 @@ class AssessmentStage(_Stage):
     arm: Arm
     ego: Side
     non_ego: Side
+    games_of: str = field(default="", repr=False)
+    """The same arm of an earlier training seed, whose games it has; empty: it plays its own."""
 
     kind, verb, unit = "assessment", "assess", "episodes"
 
@@ -198,8 +202,17 @@ class AssessmentStage(_Stage):
         return (*self.ego, *self.non_ego)
 
     @property
+    def needs(self) -> tuple[str, ...]:
+        return (self.games_of,) if self.games_of else super().needs
+
+    @property
     def sides(self) -> tuple[Side, Side]:
         return self.ego, self.non_ego
+
+    @property
+    def is_untrained(self) -> bool:
+        """Whether no driver depends on the training seed: its games are then the same for each."""
+        return all(isinstance(each, SumoDriven | External) for each in members_of(*self.drivers))
 
     @property
     def is_pair(self) -> bool:

@@ -16,7 +16,7 @@ from harness.config.campaign import Campaign
 from harness.evaluation.comparisons.comparison import games_by_arm, rate_cells
 from harness.evaluation.comparisons.preventability import by_regulation
 from harness.evaluation.competence import gate
-from harness.evaluation.result_columns import NOBODY, SUMO_DRIVER
+from harness.evaluation.result_columns import NOBODY, SUMO_DRIVER, UNTRAINED
 from harness.evaluation.strategies import Arm, ShieldedEgo, SumoNonEgo, strategy_name
 from harness.evaluation.tables import read_csv
 from harness.evaluation.worst_first import worst_first
@@ -64,7 +64,7 @@ def _each_once(rows: Sequence[Mapping[str, Any]]) -> Iterator[Mapping[str, Any]]
     seen = set[tuple[str, str, str]]()
     for row in rows:
         pairing = (row["scene"], row["person"], row["shield"])
-        if row["person"] not in (NOBODY, SUMO_DRIVER) or pairing not in seen:
+        if row["person"] not in UNTRAINED or pairing not in seen:
             yield row
         seen.add(pairing)
 
