@@ -7,6 +7,7 @@ and every game is reset. So an interrupted training gives the same policy as an 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
@@ -65,9 +66,10 @@ def train(
     SimulationError if SUMO fails, ValueError if the initial policy does not fit the network.
     """
     torch.set_num_threads(1)
-    environment = open_games(spec)
-    try:
+    with ExitStack() as opened:
+        environment = opened.enter_context(closing(open_games(spec)))
         model = _learner(spec, environment, tensorboard)
+        opened.enter_context(closing(model.logger))  # TensorBoard writes in a thread
         progress = read_checkpoint(model, key, checkpoint)
         if progress is None:
             progress = Progress(
@@ -86,8 +88,6 @@ def train(
             progress = _segment(spec, model, environment, progress=progress, on_progress=on_progress)
             write_checkpoint(model, progress, key, checkpoint)
         return TrainingResult(policy=policy_of(model, card), progress=progress, stopped=stopped)
-    finally:
-        environment.close()
 
 
 def _stop_reason(spec: TrainingSpec, progress: Progress) -> str | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -79,8 +80,10 @@ def test_train__has_a_complete_curve(alone: TrainingSpec, trained: TrainingResul
 
 
 def test_train__again_is_the_same(alone: TrainingSpec, trained: TrainingResult, tmp_path: Path) -> None:
+    threads = threading.active_count()
     assert same(in_one_go(alone, tmp_path, tensorboard=tmp_path / "events"), trained, tmp_path)
     assert list((tmp_path / "events").glob("events.out.tfevents*"))
+    assert threading.active_count() == threads  # the one that writes for TensorBoard has ended
 
 
 @pytest.mark.parametrize("segments", [0, 1, 2])
@@ -305,6 +308,7 @@ def test_train__a_flat_curve_of_failures_is_not_convergence(
 
 WITHOUT_COMPILER = """
 import sys
+import threading
 import torch
 from harness.training.ppo import _leave_out_compiler
 
