@@ -11,7 +11,7 @@ A human driver would not have followed a course that reacts to nothing either: t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -60,10 +60,13 @@ class Takeover:
 
     danger_step: int | None
     """The first step in which its rule says danger; None: it never does."""
-    prevented: bool
-    course: FloatArray | None = None
+    course: FloatArray | None
     """[T, 3] x_m, y_m, heading_rad of the ego from `danger_step` until `AFTERWARDS_S` after the recorded collision;
     None unless it is prevented."""
+
+    @property
+    def prevented(self) -> bool:
+        return self.course is not None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,7 +108,7 @@ class ConflictReplay:
         grids = [list(range(0, each.course.failed_step, spacing)) for each in self._collisions]
         games = np.repeat(np.arange(len(grids)), [len(grid) for grid in grids])
         steps = np.concatenate([np.array(grid, dtype=np.int64) for grid in grids])
-        avoids = self._prevented(games, steps, lambda: FullBraking(self._car))
+        avoids = self._prevented(games, steps)
         found = np.unique(games[avoids])
         good = [steps[(games == game) & avoids] for game in found]
         first, last = (np.array([end(each) for each in good], dtype=np.int64) for end in (np.min, np.max))
@@ -122,7 +125,7 @@ class ConflictReplay:
         good, bad = good.copy(), bad.copy()
         while len(open_ := np.flatnonzero(np.abs(good - bad) > 1)):
             middle = (good[open_] + bad[open_]) // 2
-            avoids = self._prevented(games[open_], middle, lambda: FullBraking(self._car))
+            avoids = self._prevented(games[open_], middle)
             good[open_[avoids]], bad[open_[~avoids]] = middle[avoids], middle[~avoids]
         return good
 
@@ -135,13 +138,9 @@ class ConflictReplay:
         danger &= np.arange(steps)[:, None] < ends
         first = np.where(danger.any(axis=0), danger.argmax(axis=0), _NEVER)
         taken = np.flatnonzero(first != _NEVER)
-        courses = dict(zip(taken.tolist(), self._courses(taken, first[taken], lambda: driver), strict=True))
+        courses = dict(zip(taken.tolist(), self._courses(taken, first[taken], driver), strict=True))
         return [
-            Takeover(
-                danger_step=None if step == _NEVER else step,
-                prevented=courses.get(game) is not None,
-                course=courses.get(game),
-            )
+            Takeover(danger_step=None if step == _NEVER else step, course=courses.get(game))
             for game, step in enumerate(first.tolist())
         ]
 
@@ -155,17 +154,18 @@ class ConflictReplay:
             observations.append(arena.observation[:, EGO].copy())
         return np.array(observations)
 
-    def _prevented(self, games: IntArray, steps: IntArray, driver: Callable[[], Driver]) -> BoolArray:
-        """[N] whether a driver that takes over in collisions `games` [N] in `steps` [N] prevents them."""
-        return np.array([course is not None for course in self._courses(games, steps, driver)], dtype=bool)
+    def _prevented(self, games: IntArray, steps: IntArray) -> BoolArray:
+        """[N] whether full braking from `steps` [N] on prevents the collisions `games` [N]."""
+        courses = self._courses(games, steps, FullBraking(self._car))
+        return np.array([course is not None for course in courses], dtype=bool)
 
-    def _courses(self, games: IntArray, steps: IntArray, driver: Callable[[], Driver]) -> list[FloatArray | None]:
+    def _courses(self, games: IntArray, steps: IntArray, driver: Driver) -> list[FloatArray | None]:
         """The course of a driver that takes over in each of the collisions `games` [N] in `steps` [N], as
         `Takeover.course`."""
         courses: list[FloatArray | None] = []
         for first in range(0, len(games), _GAMES_AT_ONCE):
             part = slice(first, first + _GAMES_AT_ONCE)
-            courses += self._courses_at_once(games[part], steps[part], driver())
+            courses += self._courses_at_once(games[part], steps[part], driver)
         return courses
 
     def _courses_at_once(self, games: IntArray, steps: IntArray, driver: Driver) -> list[FloatArray | None]:

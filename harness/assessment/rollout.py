@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -66,15 +66,11 @@ class Game:
 
 def assess(
     arm: SeatedArm,
-    episodes: int | Iterable[int],
-    on_start: Callable[[int], None] = lambda episode: None,
-    abandoned: Mapping[int, str] = MappingProxyType({}),
+    episodes: Iterable[int],
     start_from: Callable[[InitialState], InitialState] = lambda drawn: drawn,
-) -> Iterator[Game]:
-    """Play episodes, numbers 0 to `episodes` - 1 or the given numbers, one after the other: `assess_batches` with
-    batches of one."""
-    numbers = range(episodes) if isinstance(episodes, int) else episodes
-    return assess_batches(arm, ([episode] for episode in numbers), on_start, abandoned, start_from)
+) -> Generator[Game, None, None]:
+    """Play episodes, given by their numbers, one after the other: `assess_batches` with batches of one."""
+    return assess_batches(arm, ([episode] for episode in episodes), start_from=start_from)
 
 
 def assess_batches(
@@ -83,7 +79,7 @@ def assess_batches(
     on_start: Callable[[int], None] = lambda episode: None,
     abandoned: Mapping[int, str] = MappingProxyType({}),
     start_from: Callable[[InitialState], InitialState] = lambda drawn: drawn,
-) -> Iterator[Game]:
+) -> Generator[Game, None, None]:
     """Play batches of episodes, in their order. A game that can't be played, or that has impossible numbers, is a
     record with outcome `error`.
 

@@ -10,11 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.drivers.car import car_of
-from harness.drivers.ordinary_walker import OrdinaryWalker
-from harness.drivers.rules_driver import LANE_KEEPER, RulesDriver
-from harness.environments.arena import Arena
-from harness.environments.seats import Seat
+from harness.drivers.rules_driver import lane_keeper
+from harness.environments.arena import Arena, Seat
 from harness.errors import Problem, SimulationError, UsageError
 from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import draw_initial_state
@@ -49,16 +46,12 @@ class RouteTrial:
 def try_routes(scene: OpenScene, *, starts: int = STARTS) -> list[RouteTrial]:
     """The trial of each player's route. Raises SimulationError if SUMO can't load the scene."""
     world, players = scene.world, range(len(scene.world.roles))
-    drivers = [
-        OrdinaryWalker(world, each) if world.walks[each] else RulesDriver(LANE_KEEPER, car_of(world, each))
-        for each in players
-    ]
     drawn = {}
     for player in players:
         alone = scene.start_distribution([HumanFactors()] * len(players), [float(each == player) for each in players])
         for number in range(starts):
             drawn[player * starts + number] = draw_initial_state(alone, "route trial", player, number)
-    arena = Arena(scene, len(drawn), [Seat(each) for each in drivers])
+    arena = Arena(scene, len(drawn), [Seat(lane_keeper(world, each)) for each in players])
     try:
         arena.reset(drawn)
         lasted_s = np.zeros((arena.games, len(players)))

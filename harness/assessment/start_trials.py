@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import replace
 from itertools import repeat
 
@@ -12,6 +12,7 @@ from harness.assessment.rollout import Game, assess
 from harness.assessment.seated_arm import SeatedArm
 from harness.game.arrays import FloatArray
 from harness.game.initial_state import InitialState
+from harness.game.start_range import poses_of
 from harness.road.scene.open_scene import OpenScene
 
 
@@ -20,11 +21,7 @@ def start_at(
 ) -> InitialState:
     """A drawn start with other positions (of the front bumpers, along the players' lines) and speeds [P]."""
     lengths_m = scene.world.length_m
-    poses = [
-        place.pose(position, length)
-        for place, position, length in zip(scene.places, position_m, lengths_m.tolist(), strict=True)
-    ]
-    x_m, y_m, heading_rad = np.array(poses).T
+    x_m, y_m, heading_rad = poses_of(scene.places, position_m, lengths_m)
     positions = np.array(position_m, dtype=float)
     return replace(
         drawn,
@@ -45,7 +42,7 @@ class StartTrials:
         self._next: FloatArray | None = None
         self.last_start: FloatArray = np.empty(0)
         """[2 P] the start of the game that was played last."""
-        self._games: Iterator[Game] = assess(arm, repeat(episode), start_from=self._start)
+        self._games: Generator[Game, None, None] = assess(arm, repeat(episode), start_from=self._start)
 
     def play(self, start: FloatArray | None) -> Game:
         """Play the episode from a start [2 P]: the players' positions, then their speeds; None: from the one that is
@@ -57,7 +54,7 @@ class StartTrials:
         return self
 
     def __exit__(self, *error: object) -> None:
-        self._games.close()  # type: ignore[attr-defined]
+        self._games.close()
 
     def _start(self, drawn: InitialState) -> InitialState:
         start = drawn

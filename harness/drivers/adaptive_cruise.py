@@ -66,7 +66,7 @@ def cruise_mps2(
     motion: OwnMotion, encounters: Encounters, *, before_mps2: FloatArray, law: Cruise, step_s: float
 ) -> FloatArray:
     """[N] acceleration that the cruise control requests, given its request of the step before (`before_mps2`)."""
-    target = target_speed_mps(motion.limit_mps, motion.path_bend_per_m, law)
+    target = target_speed_mps(motion.speed_limit_mps, motion.path_bend_per_m, law)
     rolling = np.sqrt(ROLLING_MPS**2 + law.max_braking_mps2 * np.maximum(motion.stop_line_m, 0.0))
     target = np.where(motion.stop_sign, np.minimum(target, rolling), target)
     over = target - motion.speed_mps

@@ -16,7 +16,6 @@ from harness.drivers.car import car_of
 from harness.drivers.perception import Encounters, OwnMotion, perceive
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.junctions import KERB_M
-from harness.game.observation_layout import LAYOUT
 from harness.game.walking import TURNS_AS_AT_MPS
 from harness.game.world import World
 
@@ -27,7 +26,6 @@ _DRIVERS_REACT_S, _DRIVERS_BRAKE_MPS2 = 1.0, 3.0  # of a vehicle that can stop i
 _STOPPING_MPS2, _CHANGE_MPS2 = 1.0, 1.4
 _LOOKS_AHEAD_M = 1.5  # it turns to a point of its way this far ahead
 _TURNS_PER_S = 2.0  # share of the turn to that point
-_GOAL = LAYOUT.index("goal_m")
 
 
 class OrdinaryWalker:
@@ -49,7 +47,7 @@ class OrdinaryWalker:
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
         """Actions [N, 2] from observations [N, SIZE]. Decisions are deterministic: `noise` is not used."""
         motion, others = perceive(self._car, observation)
-        front_m = self._goal_m - self._car.physical(observation)[:, _GOAL] + 0.5 * self._car.length_m
+        front_m = self._goal_m - motion.goal_m + 0.5 * self._car.length_m
         ahead_m = self._kerbs_m - front_m[:, None]
         room_m = np.where(ahead_m >= -KERB_M, np.maximum(ahead_m, 0.0), np.inf).min(axis=1, initial=np.inf)
         waits = self._must_wait(others) & np.isfinite(room_m)

@@ -9,10 +9,8 @@ import numpy as np
 
 from harness.drivers.car import Car
 from harness.game.arrays import BoolArray, FloatArray
-from harness.game.observation_layout import ENTRIES, LAYOUT, OTHERS
+from harness.game.observation_layout import ENTRIES, FIRST_OTHER, OTHERS, OWN
 from harness.game.road import AHEAD_M
-
-_TURNED, _BEND, _OTHER = map(LAYOUT.index, ("path_turned_rad@0m", "path_bend_per_m@0m", "other0_seen"))
 
 
 class Encounters(NamedTuple):
@@ -47,10 +45,10 @@ class OwnMotion(NamedTuple):
     """The own motion and the own path, [N] or [N, len(AHEAD_M)]."""
 
     speed_mps: FloatArray
-    limit_mps: FloatArray
-    """Speed limit."""
+    speed_limit_mps: FloatArray
     acceleration_mps2: FloatArray
     steering_rad: FloatArray
+    goal_m: FloatArray
     road_steering_rad: FloatArray
     """The steering angle that follows the path."""
     path_left_m: FloatArray
@@ -64,19 +62,16 @@ class OwnMotion(NamedTuple):
     signal_yellow: BoolArray
 
 
-_OWN = {name: LAYOUT.index(name) for name in OwnMotion._fields if name in LAYOUT}
-
-
 def perceive(car: Car, observation: FloatArray) -> tuple[OwnMotion, Encounters]:
     """Own motion and other road users in N games, from observations [N, SIZE]."""
     values = car.physical(observation)
-    own: dict[str, Any] = {name: values[:, k] for name, k in _OWN.items()}
+    own: dict[str, Any] = {name: values[:, getattr(OWN, name)] for name in OwnMotion._fields}
     own |= {name: own[name] > 0.5 for name in ("stop_sign", "signal_red", "signal_yellow")}
-    turned = values[:, _TURNED : _TURNED + len(AHEAD_M)]
-    bend = values[:, _BEND : _BEND + len(AHEAD_M)]
-    limit = values[:, LAYOUT.index("speed_limit_mps")]
-    motion = OwnMotion(**own, limit_mps=limit, path_turned_rad=turned, path_bend_per_m=bend)
-    return motion, _encounters(car, motion, values[:, _OTHER:].reshape(len(values), OTHERS, ENTRIES))
+    for name in ("path_turned_rad", "path_bend_per_m"):
+        first = getattr(OWN, name)
+        own[name] = values[:, first : first + len(AHEAD_M)]
+    motion = OwnMotion(**own)
+    return motion, _encounters(car, motion, values[:, FIRST_OTHER:].reshape(len(values), OTHERS, ENTRIES))
 
 
 def _encounters(car: Car, motion: OwnMotion, others: FloatArray) -> Encounters:

@@ -24,25 +24,26 @@ from harness.config.rule_driver import (
 )
 from harness.drivers import emergency_braking
 from harness.drivers.adaptive_cruise import cruise_mps2
-from harness.drivers.car import Car
+from harness.drivers.car import Car, car_of
+from harness.drivers.ordinary_walker import OrdinaryWalker
 from harness.drivers.perception import Encounters, OwnMotion, perceive
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.bicycle import followed_share
+from harness.game.world import World
 
 CALM_S = 1.0
 """After this time without danger, the next danger needs the full reaction time again."""
-_CRUISING, _REQUESTED, _ROWS = 3, 4, 5
+_CRUISING, _REQUESTED = 3, 4
 """Rows of a driver's state, after those of `ReactionState`: what cruise control and driver requested last, in m/s²."""
 _Law: TypeAlias = EmergencyBraking | CarefulAndCompetent | Rss | FuzzySafety
 
-LANE_KEEPER = Rules(
+_LANE_KEEPER = Rules(
     kind="rules",
     name="lane_keeper",
     description="Cruises and keeps its lane, with so little inertia that its actions follow from what it sees.",
     cruise=Cruise(max_jerk_mps3=50.0),
     lane_keeping=LaneKeeping(max_lateral_jerk_mps3=20.0),
 )
-"""The driver that new policies imitate, and that tries the routes of scenes."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,7 +124,7 @@ class RulesDriver:
         tables: list[_Law | None] = [getattr(rules, name) for name in REACTIONS]
         self._law = next((table for table in tables if table is not None), None)
         self._reaction = _reaction_by(self._law)
-        self._state: FloatArray = np.zeros((5, 0))
+        self._state: FloatArray = np.zeros((_REQUESTED + 1, 0))
 
     def reset(self, games: IntArray) -> None:
         """Reset games [N]: no reaction is under way."""
@@ -195,3 +196,8 @@ def _reaction_by(law: _Law | None) -> BrakeReaction:
             return BrakeReaction(reaction_s=law.reaction_s, jerk_mps3=law.jerk_mps3, coasting_mps2=coasting_mps2)
         case _:
             return BrakeReaction(reaction_s=law.reaction_s, jerk_mps3=law.jerk_mps3)
+
+
+def lane_keeper(world: World, player: int) -> RulesDriver | OrdinaryWalker:
+    """The driver that a player's new policies imitate, and that tries its route; on foot an ordinary walker."""
+    return OrdinaryWalker(world, player) if world.walks[player] else RulesDriver(_LANE_KEEPER, car_of(world, player))

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from harness.environments.cartesian_views import CartesianViews, Sights
+from harness.environments.cartesian_views import CartesianViews
 from harness.environments.knowledge import Knowledge
 from harness.environments.live_simulation import LiveSimulation
 from harness.environments.nearby_bodies import NearbyBodies
@@ -116,7 +116,8 @@ class Arena(LiveSimulation):
         """States of the traffic lights as `Reading.signal_texts`; up to date if games are recorded."""
         self.nearby = NearbyBodies(self.world, scene.obstacles, games)
         self.knowledge = Knowledge(scene, games, (self._limits, self.nearby), self._taken_over)
-        self._views = CartesianViews(scene, [[seat.driver for seat in of_player] for of_player in self.seats])
+        drivers_of = [[seat.driver for seat in of_player] for of_player in self.seats]
+        self._views = CartesianViews(scene, drivers_of, (self.nearby, self.simulation), self._taken_over)
 
     def reset(
         self, starts: Mapping[int, InitialState], departures: Mapping[int, list[Departure]] | None = None
@@ -210,8 +211,8 @@ class Arena(LiveSimulation):
             games = np.flatnonzero(plays)
             if seat.driver is not None and seat.driver.takes_over and len(games):
                 noise = self._noise[games, player, now[games]]
-                if (planner := self._views.planner(seat.driver)) is not None:
-                    self._views.show(planner, player, games, self._sights(games))
+                if self._views.plans(seat.driver):
+                    self._show(seat, player, games)
                 decided = seat.driver.decide(games, self.observation[games, player], noise)
                 of = f"{self.world.roles[player]}, {type(seat.driver).__name__},"
                 chosen[games, player] = checked_decisions(decided, of, games, state.step)
@@ -293,19 +294,12 @@ class Arena(LiveSimulation):
     def _observed(self, quantities: Quantities, games: IntArray, *, advance: bool = False) -> FloatArray:
         return self.knowledge.observations(quantities, self.state.step, self.reading, games, advance=advance)
 
-    def _sights(self, games: IntArray) -> Sights:
-        """What there is to see in games [N] now; the ways of the players do not matter for it."""
+    def _show(self, seat: Seat, player: int, games: IntArray) -> None:
+        """Show the planner on a seat what its player sees in games [N]; the players' ways do not matter for it."""
         state = self.state.of(games)
         quantities = self._quantities(state, state, np.zeros(state.x_m.shape), games)
-        return Sights.of(
-            quantities,
-            self.knowledge.seen(quantities, self.state.step, self.reading, games),
-            games=games,
-            nearby=self.nearby,
-            reading=self.reading,
-            taken_over=self._taken_over,
-            simulation=self.simulation,
-        )
+        known = self.knowledge.seen(quantities, self.state.step, self.reading, games)
+        self._views.show(seat.driver, player, games, (quantities, known, self.reading))
 
     # --- observations ------------------------------------------------------------------------------------
 

@@ -65,8 +65,16 @@ class _Memory:
 class CartesianViews:
     """The views of all planners on the seats of an arena."""
 
-    def __init__(self, scene: OpenScene, seats: Sequence[Sequence[Driver | None]]) -> None:
-        """`seats` [P][n] are the drivers of each player's seats."""
+    def __init__(
+        self,
+        scene: OpenScene,
+        seats: Sequence[Sequence[Driver | None]],
+        around: tuple[NearbyBodies, Simulation],
+        taken_over: BoolArray,
+    ) -> None:
+        """`seats` [P][n] are the drivers of each player's seats, `taken_over` [P] the players that the harness
+        drives."""
+        (self._nearby, self._simulation), self._taken_over = around, taken_over
         found = [(driver, planner_of(driver)) for of_player in seats for driver in of_player if driver is not None]
         self._planners = {id(driver): planner for driver, planner in found if planner is not None}
         self._scene, self._memories = scene, dict[tuple[int, int], _Memory]()
@@ -76,16 +84,30 @@ class CartesianViews:
         for key in [each for each in self._memories if each[0] in games]:
             del self._memories[key]
 
-    def planner(self, driver: Driver) -> Planner | None:
-        """The planner in one of the drivers of the seats."""
-        return self._planners.get(id(driver))
+    def plans(self, driver: Driver | None) -> bool:
+        """Whether a driver of the seats is a planner, or holds one."""
+        return id(driver) in self._planners
 
-    def show(self, planner: Planner, player: int, games: IntArray, sights: Sights) -> None:
-        """Show a planner what its player sees in games [N]."""
+    def show(
+        self, driver: Driver | None, player: int, games: IntArray, there: tuple[Quantities, Seen, Reading | None]
+    ) -> None:
+        """Show the planner in a driver what its player sees in games [N], by their quantities, what the players take
+        the bodies to be, and the reading of all games."""
+        planner, (quantities, known, reading) = self._planners[id(driver)], there
+        sights = _Sights(
+            games=games,
+            state=quantities.state,
+            bodies=known.bodies,
+            names=self._nearby.names(quantities.bodies, reading, games),
+            reading=reading,
+            perceived=known.motion,
+            seen=seen_bodies(quantities, known),
+            driven_by_sumo=quantities.state.running & ~self._taken_over,
+        )
         views = [self._view(planner, player, row, game, sights) for row, game in enumerate(games.tolist())]
         planner.see(games, views)
 
-    def _view(self, planner: Planner, player: int, row: int, game: int, sights: Sights) -> CartesianView:
+    def _view(self, planner: Planner, player: int, row: int, game: int, sights: _Sights) -> CartesianView:
         world, state, road = self._scene.world, sights.state, self._scene.cartesian_roads[player]
         longest = round(planner.history_s / world.step_s)
         memory = self._memories.setdefault((game, player), _Memory({}, {}, deque(maxlen=longest)))
@@ -112,12 +134,12 @@ class CartesianViews:
         memory.past.append(view)
         return shown
 
-    def _objects(self, memory: _Memory, who: tuple[int, int, int], sights: Sights) -> list[SeenObject]:
+    def _objects(self, memory: _Memory, who: tuple[int, int, int], sights: _Sights) -> list[SeenObject]:
         row, game, player = who
         bodies = np.flatnonzero(sights.seen[row, player]).tolist()
         named = [self._named(row, body, sights) for body in bodies]
         by_sumo = [(game, each.driven_by_sumo) for each in named if each.driven_by_sumo is not None]
-        lights = iter(sights.simulation.turn_signals(by_sumo) if by_sumo else ())
+        lights = iter(self._simulation.turn_signals(by_sumo) if by_sumo else ())
         objects = []
         for body, each in zip(bodies, named, strict=True):
             number = memory.numbers.setdefault(each.key, len(memory.numbers))
@@ -144,7 +166,7 @@ class CartesianViews:
             )
         return objects
 
-    def _named(self, row: int, body: int, sights: Sights) -> _Named:
+    def _named(self, row: int, body: int, sights: _Sights) -> _Named:
         """The body of an index: a player, a background vehicle, or an obstacle."""
         scene, types = self._scene, self._scene.routes.types
         if body < len(scene.world.roles):
@@ -165,7 +187,7 @@ class CartesianViews:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sights:
+class _Sights:
     """What there is to see in games [N], and who sees it. Rows are games [N]; `reading` has all games of the arena."""
 
     games: IntArray
@@ -179,34 +201,6 @@ class Sights:
     """[N, P, B]"""
     driven_by_sumo: BoolArray
     """[N, P] players that SUMO drives now."""
-    simulation: Simulation
-
-    @classmethod
-    def of(
-        cls,
-        quantities: Quantities,
-        known: Seen,
-        *,
-        games: IntArray,
-        nearby: NearbyBodies,
-        reading: Reading | None,
-        taken_over: BoolArray,
-        simulation: Simulation,
-    ) -> Sights:
-        """What the players see of these quantities of games [N], by what they take the bodies to be; `taken_over` [P]
-        are the players that the harness drives."""
-        state = quantities.state
-        return cls(
-            games=games,
-            state=state,
-            bodies=known.bodies,
-            names=nearby.names(quantities.bodies, reading, games),
-            reading=reading,
-            perceived=known.motion,
-            seen=seen_bodies(quantities, known),
-            driven_by_sumo=state.running & ~taken_over,
-            simulation=simulation,
-        )
 
     def sighting(self, row: int, player: int, body: int) -> _Sighting:
         """What a player takes a body to do: errors scale its distance, and add a velocity along the line of sight."""

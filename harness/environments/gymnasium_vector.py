@@ -149,9 +149,8 @@ def make_vec(
         return VectorDrivingEnv(n, **arguments)
     if interface != "sb3":
         raise UsageError.of("make_vec", "interface", f"is {interface!r}", "one of gymnasium, sb3")
-    given = {"scene": SCENE, "player": "ego", "persona": PERSONA, "other": None, "other_persona": None, **arguments}
     _check_number(n)
-    seating = seating_of(**given)
+    seating = seating_of(**arguments)
     arena = Arena(seating.scene, n, seating.seats, seed=seed)
     return ArenaVecEnv(arena, seating.learner, seating.start_distribution, _PARTS, seed)
 

@@ -82,12 +82,12 @@ class Seating:
 
 
 def seating_of(
-    scene: Place | OpenScene,
-    player: str,
+    scene: Place | OpenScene = SCENE,
+    player: str = "ego",
     *,
-    persona: Place,
-    other: Place | None,
-    other_persona: Place | None,
+    persona: Place = PERSONA,
+    other: Place | None = None,
+    other_persona: Place | None = None,
     allow_code: bool = False,
 ) -> Seating:
     """The players, by the arguments of `DrivingEnv`. Raises UsageError for arguments that are wrong and files that

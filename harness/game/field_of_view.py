@@ -16,9 +16,6 @@ from harness.game.meetings import Meetings
 from harness.game.memory import Perceived
 from harness.game.state import Bodies
 
-SEEN_M = 120.0
-"""Bodies farther away are seen by nobody."""
-
 Eyes: TypeAlias = tuple[float, float, float, float, float, bool, float, float]
 """Of a player: cosine and sine of its heading, the distances at which it sees road users and bodies that never move,
 the cosine of half its field of view, whether it looks over its shoulder, its length and its width."""

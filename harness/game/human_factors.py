@@ -29,7 +29,7 @@ import numpy as np
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.jit import compiled
 from harness.game.seeding import between
-from harness.game.state import ALL_AROUND, State
+from harness.game.state import State, sight_cosine
 
 Controls = Literal["released", "held"]
 
@@ -277,8 +277,7 @@ class PlayersLimits:
         errors = limits.estimation_errors
         self._estimation_errors[game, player] = 0.0 if errors is None else errors
         state.sight_m[game, player] = limits.sight_m
-        all_around = limits.field_of_view_rad >= 2.0 * np.pi
-        state.sight_cosine[game, player] = ALL_AROUND if all_around else np.cos(0.5 * limits.field_of_view_rad)
+        state.sight_cosine[game, player] = sight_cosine(limits.field_of_view_rad)
         first = self._estimation_errors[game, player, 0]
         state.distance_error[game, player], state.closing_error_per_s[game, player] = first
         self.delays |= limits.delay_steps > 0

@@ -31,7 +31,7 @@ from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles
 from harness.game.road import Routes
 from harness.game.roles import EGO
 from harness.game.seeding import between, generator_of, parts_of, seed_of
-from harness.game.start_range import StartRange, draw_along_route, starts_in
+from harness.game.start_range import StartRange, draw_along_route, poses_of, starts_in
 
 _UNLIMITED = (Reaction(), Sight(), ActuatorShares())
 
@@ -134,10 +134,6 @@ def draw_initial_state(starts: StartDistribution, *parts: str | int) -> InitialS
     drawn = generator.random(4 * len(players))  # the same numbers as drawn one by one
     draws = iter(drawn[2 * len(players) :].tolist())
     positions_m, speeds_mps = starts_in(starts.places, drawn[: 2 * len(players)].reshape(-1, 2))
-    poses = [
-        place.pose(position, length)
-        for place, position, length in zip(starts.places, positions_m, starts.length_m.tolist(), strict=True)
-    ]
     present = _present(draws, starts.present_share)
     member = [
         0 if len(shares) == 1 else draw_member(shares, player, *parts) for player, shares in enumerate(starts.shares)
@@ -150,7 +146,7 @@ def draw_initial_state(starts: StartDistribution, *parts: str | int) -> InitialS
         if each.attention is not None:
             of_player = generator_of(*parts, "attention", player)
             lapses[player] = draw_lapses(each.attention, starts.steps, starts.step_s, of_player)
-    x, y, heading = np.array(poses).T
+    x, y, heading = poses_of(starts.places, positions_m, starts.length_m)
     positions, speeds = np.array(positions_m), np.array(speeds_mps)
     stations = positions - 0.5 * starts.length_m
     if starts.along_route_share and not (starts.meet_in_place and sum(present) > 1):

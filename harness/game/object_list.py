@@ -17,7 +17,7 @@ import numpy as np
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.field_of_view import Seen
 from harness.game.jit import compiled
-from harness.game.meetings import Meetings
+from harness.game.meetings import Meetings, no_meetings
 from harness.game.memory import Perceived
 from harness.game.perception_errors import (
     LOSS,
@@ -32,7 +32,7 @@ from harness.game.perception_errors import (
 )
 from harness.game.quantities import Quantities
 from harness.game.roles import EGO
-from harness.game.state import Bodies
+from harness.game.state import Bodies, sight_cosine
 
 _ROOM = 8  # initial number of objects per game
 _NO_LOSSES = ((0.0, 0.0, 1.0),)
@@ -55,10 +55,9 @@ class ObjectLists:
 
     def __init__(self, errors: PerceptionErrors, games: int, steps: int, step_s: float) -> None:
         self._errors, self._steps = errors, steps
-        all_around = errors.field_of_view_rad >= 2.0 * np.pi
         self._sensing = _Sensing(
             range_m=errors.range_m,
-            cosine=-2.0 if all_around else float(np.cos(0.5 * errors.field_of_view_rad)),
+            cosine=sight_cosine(errors.field_of_view_rad),
             latency_steps=round(errors.latency_s / step_s),
             losses=np.array(errors.losses or _NO_LOSSES),
             position=(errors.position.sd, errors.position.sd_per_m),
@@ -185,13 +184,12 @@ class ObjectLists:
         motion = np.stack([np.broadcast_to(each[:, None], shape) for each in added[:4]])
         hidden = np.ones(shape, dtype=bool)
         hidden[:, EGO] = ~there
-        nothing = (np.full(shape, -1), *np.full((5, *shape), np.inf), np.zeros(shape, dtype=bool))
-        meetings = (np.concatenate(pair, axis=2) for pair in zip(seen.meetings, nothing, strict=True))
+        meetings = (np.concatenate(pair, axis=2) for pair in zip(seen.meetings, no_meetings(shape), strict=True))
         return Seen(
             bodies=bodies,
             motion=np.concatenate((seen.motion, motion), axis=3),
             hidden=np.concatenate((seen.hidden, hidden), axis=2),
-            meetings=Meetings(*meetings),
+            meetings=Meetings._make(meetings),
         )
 
 

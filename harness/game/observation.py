@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
-from harness.game.field_of_view import SEEN_M, Eyes, Seen, in_view
+from harness.game.field_of_view import Eyes, Seen, in_view
 from harness.game.jit import compiled, inlined
 from harness.game.junctions import Control, Signal, StopLines
 from harness.game.meetings import Meetings
@@ -28,6 +28,7 @@ from harness.game.observation_layout import BEHIND, COMPRESSED, ENTRIES, FIRST_O
 from harness.game.quantities import Quantities
 from harness.game.road import AHEAD_M, Routes
 from harness.game.route_coordinates import OnRoute, half_extents_m, on_route, point_along_route, row_ahead
+from harness.game.sight import SEEN_M
 from harness.game.state import Bodies
 
 _EDGES = np.concatenate(([-2.5], 0.5 * (AHEAD_M[1:] + AHEAD_M[:-1]), [60.0]))  # bins of road around AHEAD_M

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import IntEnum
 from functools import partial
 from math import nan
@@ -73,14 +73,14 @@ def _ends(group: str, meaning: str, form: Form, outcome: Outcome) -> Term:
     )
 
 
-def _below(meaning: str, quantity: str, parameter: str, *, per_second: bool = True) -> Term:
-    limited = Term(group="safety", meaning=meaning, quantity=quantity, form=Form.BELOW, parameter=parameter)
-    return replace(limited, per_second=per_second)
-
-
 _safety = partial(Term, group="safety")
 _operational = partial(Term, group="operational")
 _human = partial(Term, group="human")
+
+
+def _below(meaning: str, quantity: str, parameter: str, *, per_second: bool = True) -> Term:
+    return _safety(meaning=meaning, quantity=quantity, form=Form.BELOW, parameter=parameter, per_second=per_second)
+
 
 TERMS: Mapping[str, Term] = {
     "collision": _ends("safety", "touching a vehicle or person", Form.LOST, Outcome.COLLISION),

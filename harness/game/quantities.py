@@ -16,7 +16,7 @@ from harness.game.bicycle import lateral_acceleration_mps2
 from harness.game.geometry import Box, distance_to_nearest_box, time_to_first_contact
 from harness.game.jit import compiled
 from harness.game.meetings import HORIZON_S, STANDING_MPS, Meetings, meetings, no_meetings
-from harness.game.road import SPACING_M, Along
+from harness.game.road import SPACING_M, Along, along
 from harness.game.route_coordinates import PATH_M, OnPath, on_path
 from harness.game.sight import hidden
 from harness.game.state import Bodies, State
@@ -61,14 +61,10 @@ class Quantities:
     @cached_property
     def along(self) -> Along:
         """The route at the players."""
-        state, world = self.state, self.world
-        car, where = world.actuators, (state.station_m, self.lateral_offset_m, state.speed_mps)
-        return world.road.routes.along(
-            *where,
-            limit_share=state.limit_share,
-            wheelbase_m=car.wheelbase_m,
-            steering_lag_s=car.steering_lag_s,
-        )
+        state, car = self.state, self.world.actuators
+        players = (state.station_m, self.lateral_offset_m, state.speed_mps)
+        wheels = (car.wheelbase_m, car.steering_lag_s)
+        return Along(*along(players, state.limit_share, wheels, tuple(self.world.road.routes)))
 
     @cached_property
     def speed_over_limit(self) -> FloatArray:

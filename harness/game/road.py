@@ -129,21 +129,6 @@ class Routes(NamedTuple):
         stations, offsets = _locate(x_m, y_m, station_m, tuple(self))
         return stations, offsets
 
-    def along(
-        self,
-        station_m: FloatArray,
-        offset_m: FloatArray,
-        speed_mps: FloatArray,
-        *,
-        limit_share: FloatArray,
-        wheelbase_m: FloatArray,
-        steering_lag_s: FloatArray,
-    ) -> Along:
-        """The routes at players with stations, lateral offsets and speeds [G, P], factors on the speed limits [G],
-        wheelbases and lags of the steering [P]."""
-        players, wheels = (station_m, offset_m, speed_mps), (wheelbase_m, steering_lag_s)
-        return Along(*_along(players, limit_share, wheels, tuple(self)))
-
 
 @compiled
 def row_at(station_m: float, first_row: int, last_row: int) -> int:
@@ -181,21 +166,21 @@ def _locate(x_m: FloatArray, y_m: FloatArray, station_m: FloatArray, table: tupl
 
 
 @compiled
-def _along(
+def along(
     players: tuple[FloatArray, FloatArray, FloatArray],
     limit_share: FloatArray,
     wheels: tuple[FloatArray, FloatArray],
     table: tuple[Any, ...],
 ) -> FloatArray:
-    """[7, G, P] the columns of `Along`, of players with stations, offsets and speeds; `wheels` are their wheelbases and
-    lags of steering.
+    """[7, G, P] the columns of `Along`, of players with stations, lateral offsets and speeds [G, P], and factors on the
+    speed limits [G]; `wheels` are their wheelbases and lags of the steering [P], `table` are the routes.
 
     A car follows the road by the bend at its rear axle, which has no slip, in `PREVIEW_S` after the lag of its
     steering. With the bend at the centre, it would leave a quarter circle by two metres.
     """
     wheelbase_m, steering_lag_s = wheels
     routes, (station_m, offset_m, speed_mps) = Routes(*table), players
-    along = np.empty((_ALONG, *station_m.shape))
+    found = np.empty((_ALONG, *station_m.shape))
     for g, p in np.ndindex(station_m.shape):
         station, offset, first, last = station_m[g, p], offset_m[g, p], routes.first_row[p], routes.last_row[p]
         row = row_at(station, first, last)
@@ -213,8 +198,8 @@ def _along(
             steering_of_bend_rad(routes.bend_per_m[rear_axle], wheelbase_m[p]),
         )
         for k, value in enumerate(columns):
-            along[k, g, p] = value
-    return along
+            found[k, g, p] = value
+    return found
 
 
 @compiled

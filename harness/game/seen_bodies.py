@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 
 from harness.game.arrays import BoolArray
-from harness.game.field_of_view import SEEN_M, Eyes, Seen, in_view
+from harness.game.field_of_view import Eyes, Seen, in_view
 from harness.game.jit import compiled
 from harness.game.memory import Perceived
 from harness.game.quantities import Quantities
+from harness.game.sight import SEEN_M
 
 
 def seen_bodies(q: Quantities, seen: Seen) -> BoolArray:

@@ -28,8 +28,8 @@ from harness.game.state import Bodies
 TALL_WIDTH_M = 2.1
 """A vehicle of at least this width hides what is behind it: SUMO's narrowest class of tall vehicles, `delivery`, is
 2.16 m wide and 2.86 m high."""
-SIGHT_LINE_M = 120.0
-"""Bodies farther away are in no observation; their lines are not computed."""
+SEEN_M = 120.0
+"""Bodies farther away are seen by nobody, and their lines are not computed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,7 +90,7 @@ def _is_hidden(
     bodies hide others [B], and the walls."""
     (eye_x_m, eye_y_m), (g, p, b), (hides, walls) = eye, who, barriers
     body = other_box(bodies, g, b)
-    if hypot(body.x_m - eye_x_m, body.y_m - eye_y_m) > SIGHT_LINE_M:
+    if hypot(body.x_m - eye_x_m, body.y_m - eye_y_m) > SEEN_M:
         return False
     along_x, along_y = 0.5 * body.length_m * cos(body.heading_rad), 0.5 * body.length_m * sin(body.heading_rad)
     across_x, across_y = -0.5 * body.width_m * sin(body.heading_rad), 0.5 * body.width_m * cos(body.heading_rad)

@@ -99,6 +99,12 @@ def starts_in(places: Sequence[StartRange], shares: FloatArray) -> tuple[list[fl
     return positions_m, speeds_mps
 
 
+def poses_of(places: Sequence[StartRange], positions_m: Sequence[float], length_m: FloatArray) -> FloatArray:
+    """[3, P] x_m, y_m and heading_rad of players of `length_m` [P] whose front bumpers are at these positions."""
+    starts = zip(places, positions_m, length_m.tolist(), strict=True)
+    return np.array([place.pose(position, length) for place, position, length in starts]).T
+
+
 def draw_along_route(
     routes: Routes,
     generator: np.random.Generator,
@@ -107,7 +113,7 @@ def draw_along_route(
     max_speed_mps: FloatArray,
     present: BoolArray,
     share: float,
-    obstacles: Box | None = None,
+    obstacles: Box,
 ) -> FloatArray | None:
     """[5, P] x_m, y_m, heading_rad, speed_mps and station_m of the centres of players of `length_m` [P].
 
@@ -152,11 +158,10 @@ def _apart(x_m: FloatArray, y_m: FloatArray, length_m: FloatArray, present: Bool
     )
 
 
-def _clear(starts: FloatArray, length_m: FloatArray, present: BoolArray, obstacles: Box | None) -> bool:
+def _clear(starts: FloatArray, length_m: FloatArray, present: BoolArray, obstacles: Box) -> bool:
     """Whether no obstacle stands on the way just before, beside or behind a player that is present."""
-    boxes = [] if obstacles is None else boxes_of(obstacles)
     ways = [
         Box(x_m, y_m, heading_rad, own_m + 2.0 * _APART_M, _CLEAR_WIDTH_M)
         for x_m, y_m, heading_rad, own_m in zip(*starts[:3, present].tolist(), length_m[present].tolist(), strict=True)
     ]
-    return all(box_distance(way, box) > 0.0 for way in ways for box in boxes)
+    return all(box_distance(way, box) > 0.0 for way in ways for box in boxes_of(obstacles))

@@ -13,9 +13,7 @@ from harness.game.geometry import Box
 from harness.game.jit import compiled
 from harness.game.outcome import Outcome
 
-ALL_AROUND = -2.0
-"""`State.sight_cosine` of a player that sees all around: below every cosine, whatever its rounding."""
-
+_ALL_AROUND = -2.0  # below every cosine, whatever its rounding
 NEAREST = 16
 """Background vehicles in the bodies of a game."""
 NOTICED_M = 120.0
@@ -79,7 +77,7 @@ class State:
             "outcome": np.zeros(shape, dtype=np.int8),
             "shoulder_glance": np.ones(shape, dtype=bool),
             "sight_m": np.full(shape, np.inf),
-            "sight_cosine": np.full(shape, ALL_AROUND),
+            "sight_cosine": np.full(shape, _ALL_AROUND),
             "step": np.zeros(games, dtype=np.int64),
             "friction": np.ones(games),
             "visibility_m": np.full(games, np.inf),
@@ -101,6 +99,11 @@ class State:
     def of(self, games: IntArray) -> State:
         """A copy of the games with indices [N]."""
         return State(**{name: array.take(games, axis=0) for name, array in vars(self).items()})
+
+
+def sight_cosine(field_of_view_rad: float) -> float:
+    """The cosine of half a field of view, -2 for one all around: `State.sight_cosine`."""
+    return _ALL_AROUND if field_of_view_rad >= 2.0 * np.pi else float(np.cos(0.5 * field_of_view_rad))
 
 
 class Bodies(NamedTuple):

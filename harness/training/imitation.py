@@ -13,13 +13,10 @@ import numpy as np
 import torch
 from stable_baselines3 import PPO
 
-from harness.drivers.car import car_of
-from harness.drivers.ordinary_walker import OrdinaryWalker
-from harness.drivers.rules_driver import LANE_KEEPER, RulesDriver
+from harness.drivers.rules_driver import lane_keeper
 from harness.environments.vector_env import JoinedVecEnv
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.observation_layout import SIZE
-from harness.game.world import World
 
 _EPOCHS, _MINIBATCH, _LEARNING_RATE = 30, 512, 1e-3
 
@@ -45,7 +42,7 @@ def _demonstrate(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """What the learner saw [N, D], what the demonstrators did [N, 2], without the noise, in so many steps of every
     game, and their returns [N]; NaN in games that had not ended."""
-    drivers = [_demonstrator(each.arena.world, each.learner) for each in environment.environments]
+    drivers = [lane_keeper(each.arena.world, each.learner) for each in environment.environments]
     games = [np.arange(each.num_envs) for each in environment.environments]
     for driver, own in zip(drivers, games, strict=True):
         driver.reset(own)
@@ -66,10 +63,6 @@ def _demonstrate(
     environment.take_finished()  # they are not games of the training
     returns = returns_of(np.array(payoffs), np.array(ended), discount)
     return np.concatenate(observations), np.concatenate(actions), returns.ravel()
-
-
-def _demonstrator(world: World, player: int) -> RulesDriver | OrdinaryWalker:
-    return OrdinaryWalker(world, player) if world.walks[player] else RulesDriver(LANE_KEEPER, car_of(world, player))
 
 
 def returns_of(payoffs: FloatArray, ended: BoolArray, discount: float) -> FloatArray:

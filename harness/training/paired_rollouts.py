@@ -39,14 +39,14 @@ def seeded_starts(
     persona: Persona,
     people: Sequence[Mixture | None],
     alone_share: float,
-    parts: Sequence[str | int],
+    *parts: str | int,
 ) -> SeededStarts:
     """The starts of an ego of this persona beside the drivers of the non-egos, in `alone_share` of the games without
-    them."""
+    them; `parts` name the random numbers."""
     human_factors = [[persona.human_factors], *map(factors_of, people)]
     shares, present = [[1.0], *map(shares_of, people)], [1.0, *[1.0 - alone_share] * len(people)]
     distribution = scene.start_distribution(human_factors, present, shares)
-    return SeededStarts(distribution=distribution, parts=tuple(parts))
+    return SeededStarts(distribution=distribution, parts=parts)
 
 
 class PairedRollouts:
@@ -55,24 +55,21 @@ class PairedRollouts:
     def __init__(
         self,
         scene: OpenScene,
+        starts: SeededStarts,
         *,
         persona: Persona,
         people: Sequence[Mixture | None],
         games: int,
         at_once: int,
-        alone_share: float,
-        parts: Sequence[str | int],
     ) -> None:
-        """Load SUMO. `persona` is the ego's, `people` are the drivers of the non-egos. `alone_share` is the share of
-        games without them; `parts` name the random numbers.
+        """Load SUMO. `persona` is the ego's, `people` are the drivers of the non-egos, as in `starts`.
 
         Raises SimulationError if SUMO can't load the scene.
         """
-        self._scene, self._games, self._parts = scene, games, tuple(parts)
+        self._scene, self._games, self._starts = scene, games, starts
         self._loads = ceil(games / at_once)
         self._tiles = ceil(games / self._loads)
         self._ego = _CurrentDriver()
-        self._starts = seeded_starts(scene, persona, people, alone_share, parts)
         seats = [(Seat(self._ego, persona.payoff),), *(seats_of(each, paid=False) for each in people)]
         self._arena = Arena(scene, self._tiles, seats)
 
@@ -92,7 +89,7 @@ class PairedRollouts:
 
     def _play(self, load: int) -> tuple[FloatArray, FloatArray]:
         arena, scene = self._arena, self._scene
-        arena.reload(seed_of(*self._parts, "load", load) % 2**31)
+        arena.reload(seed_of(*self._starts.parts, "load", load) % 2**31)
         starts = {tile: self._starts.start(load * self._tiles + tile) for tile in range(self._tiles)}
         departures = {tile: scene.departures(generator_of(*start.parts, "others")) for tile, start in starts.items()}
         arena.reset(starts, departures if scene.has_background_traffic else {})

@@ -31,7 +31,7 @@ from harness.files import write_atomically
 from harness.game.roles import EGO
 from harness.game.seeding import seed_of
 from harness.road.scene.open_scene import OpenScene
-from harness.training.paired_rollouts import PairedRollouts
+from harness.training.paired_rollouts import PairedRollouts, seeded_starts
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,12 +78,11 @@ def run_search(
         return trials
     games = PairedRollouts(
         search.scene,
+        seeded_starts(search.scene, search.persona, search.people, settings.alone_share, *search.parts, "games"),
         persona=search.persona,
         people=search.people,
         games=settings.games,
         at_once=settings.games_at_once,
-        alone_share=settings.alone_share,
-        parts=(*search.parts, "games"),
     )
     with closing(games):
         while len(trials) < total:

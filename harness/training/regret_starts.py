@@ -147,12 +147,11 @@ def first_scores(spec: TrainingSpec) -> RegretScores | None:
     drivers: list[Driver] = [*(reference_driver(each, car, lane_width_m) for each in PERSONS), spec.best_known]
     games = PairedRollouts(
         spec.scene,
+        _starts(spec),
         persona=spec.personas[0],
         people=_people(spec),
         games=POOL,
         at_once=spec.settings.games,
-        alone_share=0.0,
-        parts=_parts(spec),
     )
     with closing(games):
         payoffs, failed = zip(*map(games.play, drivers), strict=True)
@@ -163,7 +162,7 @@ def replays_of(spec: TrainingSpec, scores: RegretScores | None) -> RegretReplays
     """The replays of a training that has these scores so far; None without scores."""
     if scores is None:
         return None
-    return RegretReplays(seeded_starts(spec.scene, spec.personas[0], _people(spec), 0.0, _parts(spec)), scores)
+    return RegretReplays(_starts(spec), scores)
 
 
 def _people(spec: TrainingSpec) -> Sequence[Mixture | None]:
@@ -172,5 +171,6 @@ def _people(spec: TrainingSpec) -> Sequence[Mixture | None]:
     return place.drivers[1:]
 
 
-def _parts(spec: TrainingSpec) -> tuple[str | int, ...]:
-    return (*spec.parts, "pool")
+def _starts(spec: TrainingSpec) -> SeededStarts:
+    """The starts of the pool."""
+    return seeded_starts(spec.scene, spec.personas[0], _people(spec), 0.0, *spec.parts, "pool")

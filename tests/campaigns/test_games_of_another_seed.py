@@ -49,7 +49,7 @@ def test_plan__only_arms_without_trained_players_have_the_games_of_another_seed(
 
 def test_games__of_another_seed_are_those_that_the_arm_would_play(run: Path) -> None:
     players = RunPlayers(RunFolder(run))
-    games = list(assess(players.seated(players.arm(ARM, SECOND)), 2))
+    games = list(assess(players.seated(players.arm(ARM, SECOND)), range(2)))
     stored = dict(read_traces(RunFolder(run).traces(f"{ARM}-seed{SECOND}")))
     assert sorted(stored) == [0, 1]
     for episode, game in enumerate(games):

@@ -355,7 +355,7 @@ class Coin:
         return Mixture(tuple(Member(driver=each, persona=self.personas[1]) for each in drivers))
 
     def games(self, arm: str, ego: Mixture, episodes: int = 40) -> pd.DataFrame:
-        played = assess(SeatedArm(name=arm, scene=self.scene, drivers=(ego, self.player), seed=1), episodes)
+        played = assess(SeatedArm(name=arm, scene=self.scene, drivers=(ego, self.player), seed=1), range(episodes))
         rows = pd.DataFrame([{"arm": arm, "persona": "blind", "seed": 1, **game.record} for game in played])
         return table_of("episodes", rows.to_dict("records"))
 

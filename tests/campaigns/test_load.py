@@ -126,7 +126,7 @@ def assessment() -> Iterator[Weight]:
     """A thousand short games, each with a simulation of its own load, and their traces, fifty games to a file."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        games = assess(arm(build_scene(folder / "road", goal_m=60.0), Steady(), SumoDriver()), ASSESSED)
+        games = assess(arm(build_scene(folder / "road", goal_m=60.0), Steady(), SumoDriver()), range(ASSESSED))
         for first in range(0, ASSESSED, GAMES_PER_FILE):
             if first % (ASSESSED // WEIGHED) == 0:
                 yield Weight.now(first)

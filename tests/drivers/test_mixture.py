@@ -116,7 +116,7 @@ def test_assess__an_episode_is_that_of_its_member_alone(merge: OpenScene, people
 
     def records(other: Mixture) -> list[dict[str, Any]]:
         drivers = (mixture_of(Steady(0.0), careful), other)
-        return [game.record for game in assess(SeatedArm(name="any", scene=merge, drivers=drivers, seed=1), 6)]
+        return [game.record for game in assess(SeatedArm(name="any", scene=merge, drivers=drivers, seed=1), range(6))]
 
     alone = [records(Mixture((each,))) for each in members]
     drove = drawn_members(merge, [each.persona for each in members], 1, 6)
@@ -140,7 +140,9 @@ def test_by_who_drove__has_the_members_of_the_games(merge: OpenScene, people: di
     members = tuple(Member(driver=Steady(0.2), persona=people[name], share=share) for name, share in shares.items())
     drivers = (mixture_of(Steady(0.0), people["careful"]), Mixture(members))
     arm = SeatedArm(name="naive_vs_town", scene=merge, drivers=drivers, seed=3)
-    played = pd.DataFrame([{"arm": arm.name, "persona": "town", "seed": 3, **game.record} for game in assess(arm, 8)])
+    played = pd.DataFrame(
+        [{"arm": arm.name, "persona": "town", "seed": 3, **game.record} for game in assess(arm, range(8))]
+    )
     episodes = typed(played.reindex(columns=list(TABLES["episodes"])))
     town = [Population(name="town", shares=shares)]
     campaign = Campaign(name="any", scene="any", personas=["any"], seeds=[3], population=town)

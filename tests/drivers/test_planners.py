@@ -178,7 +178,7 @@ def outcomes(example: Path, name: str, other: SumoDriver | None, games: int) -> 
     person = other and mixture_of(other, careful)
     players = (mixture_of(driver, careful), *[person] * (len(scene.world.roles) - 1))
     arm = SeatedArm(name="naive_vs_sumo" if other else "naive_alone", scene=scene, drivers=players, seed=1)
-    return [game.played["ego_outcome"] for game in assess(arm, games)]
+    return [game.played["ego_outcome"] for game in assess(arm, range(games))]
 
 
 @pytest.mark.parametrize(

@@ -101,7 +101,7 @@ def test_tunable__has_no_parameters_of_missing_tables_or_reference_drivers() -> 
 
 def test_perceive__a_car_ahead_in_the_path(car: Car) -> None:
     view, encounters = perceive(car, seeing(12.0, 15.0, ahead_m=20.0, left_m=0.5, ahead_mps=-4.0))
-    assert (view.speed_mps[0], view.limit_mps[0]) == pytest.approx((12.0, 15.0))
+    assert (view.speed_mps[0], view.speed_limit_mps[0]) == pytest.approx((12.0, 15.0))
     first = {name: values[0, 0] for name, values in encounters._asdict().items()}
     expected = {"gap_m": 15.4, "offset_m": 0.5, "clearance_m": -1.3, "speed_mps": 8.0, "approach_mps": 0.0}
     assert {name: first[name] for name in expected} == pytest.approx(expected)
@@ -198,7 +198,7 @@ def motion(
     speed_mps: float, limit_mps: float, *, turned: float = 0.0, left: float = 0.0, steering: float = 0.0
 ) -> OwnMotion:
     """The motion of a car in one game, on a straight road without a stop line ahead."""
-    numbers = (speed_mps, limit_mps, 0.0, steering, 0.0, left)
+    numbers = (speed_mps, limit_mps, 0.0, steering, np.inf, 0.0, left)
     path = (np.full((1, len(AHEAD_M)), turned), np.zeros((1, len(AHEAD_M))))
     line = (np.array([np.inf]), *[np.array([False])] * 3)
     return OwnMotion(*(np.array([number]) for number in numbers), *path, *line)

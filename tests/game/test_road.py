@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from harness.game.arrays import FloatArray
 from harness.game.bicycle import curvature_per_m, requests
 from harness.game.rails import Rails
-from harness.game.road import MARGIN_M, SPACING_M, Routes, steering_of_bend_rad
+from harness.game.road import MARGIN_M, SPACING_M, Along, Routes, along, steering_of_bend_rad
 from tests.support.bicycle import actuators, advance, state_of
 from tests.support.roads import arc, on_arc, straight
 
@@ -67,10 +67,8 @@ def road_steering_rad(
     """The steering angles that follow the routes, [G, P], of cars on their lines."""
     on_line, limits = np.zeros_like(station_m), np.ones(len(station_m))
     no_lag_s = np.zeros_like(wheelbase_m)
-    along = routes.along(
-        station_m, on_line, speed_mps, limit_share=limits, wheelbase_m=wheelbase_m, steering_lag_s=no_lag_s
-    )
-    return along.road_steering_rad
+    found = along((station_m, on_line, speed_mps), limits, (wheelbase_m, no_lag_s), tuple(routes))
+    return Along(*found).road_steering_rad
 
 
 @pytest.mark.parametrize("radius", [15.0, -15.0, 25.0, -60.0])

@@ -11,6 +11,7 @@ import pytest
 from harness.game.arrays import FloatArray
 from harness.game.human_factors import Attention, HumanFactors, Reaction
 from harness.game.initial_state import InitialState, draw_initial_state
+from harness.game.placed_obstacles import NO_OBSTACLES
 from harness.game.road import Routes
 from harness.game.start_range import draw_along_route
 from harness.road.scene.open_scene import OpenScene
@@ -35,6 +36,7 @@ def draws(
             max_speed_mps=MAX_SPEED_MPS,
             present=np.array(present),
             share=share,
+            obstacles=NO_OBSTACLES.boxes(),
         )
         for each in generators
     ]

@@ -48,7 +48,7 @@ def arm(merge: OpenScene, *drivers: Driver | None, persona: Any = SPEEDY, seed: 
 
 def play(assessed: SeatedArm, episodes: int = 3) -> list[Game]:
     """The first games of an arm."""
-    return list(assess(assessed, episodes))
+    return list(assess(assessed, range(episodes)))
 
 
 def trace(game: Game) -> pd.DataFrame:

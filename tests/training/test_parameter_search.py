@@ -22,7 +22,7 @@ from harness.errors import StageFailed
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.roles import EGO
 from harness.road.scene.open_scene import OpenScene, open_scene
-from harness.training.paired_rollouts import PairedRollouts
+from harness.training.paired_rollouts import PairedRollouts, seeded_starts
 from harness.training.parameter_search import SearchSpec, Trial, best, propose, read_trials, run_search, write_trials
 from tests.support.external_drivers import document, find
 from tests.support.repository import REPOSITORY
@@ -80,10 +80,13 @@ class Recording:
         return self._driver.decide(games, observation, noise)
 
 
-def play(scene: OpenScene, driver: Driver, other: Mixture | None = None, **changes: Any) -> Any:
-    arguments = {"games": 7, "at_once": 3, "alone_share": 0.3, "parts": ("test", 1)} | changes
-    careful = read_document(CAREFUL, Persona)
-    games = PairedRollouts(scene, persona=careful, people=(other or opponent(),), **arguments)
+def play(
+    scene: OpenScene, driver: Driver, other: Mixture | None = None, alone_share: float = 0.3, **changes: Any
+) -> Any:
+    arguments = {"games": 7, "at_once": 3} | changes
+    careful, people = read_document(CAREFUL, Persona), (other or opponent(),)
+    starts = seeded_starts(scene, careful, people, alone_share, "test", 1)
+    games = PairedRollouts(scene, starts, persona=careful, people=people, **arguments)
     try:
         return games.play(driver), games.play(driver)
     finally:

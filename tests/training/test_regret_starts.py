@@ -94,7 +94,7 @@ def test_weights__sum_to_one_and_do_not_fall_with_regret(regret: list[float], ag
 def opposed(merge: OpenScene) -> SeededStarts:
     """Seeded starts against a speedy person."""
     other = mixture_of(Steady(), read_document(SPEEDY, Persona))
-    return seeded_starts(merge, naive_ego(merge).personas[0], (other,), 0.0, ("test", "pool"))
+    return seeded_starts(merge, naive_ego(merge).personas[0], (other,), 0.0, "test", "pool")
 
 
 def drawn(opposed: SeededStarts, count: int) -> list[InitialState]:

@@ -200,7 +200,7 @@ def _play_free(
     """
     stage, played, batches = stage_id(labels["arm"], labels["seed"]), 0, deque[list[int]]()
     folder, upcoming = run.context.folder, iter(batches.popleft, None)
-    with closing(assess_batches(arm, upcoming, run.on_start, run.attempt.abandoned)) as games:  # type: ignore[type-var]
+    with closing(assess_batches(arm, upcoming, run.on_start, run.attempt.abandoned)) as games:
         for group in groups:
             with ExitStack() as locks:
                 own = list[Segment]()
