@@ -37,9 +37,9 @@ from harness.environments.arena import Arena, Seat
 from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.tables import table_of, typed
 from harness.evaluation.trace_file import SCHEMA, trace_writer
+from harness.evaluation.worst_first import MOST_FAILURES_PER_ARM, choose_games, replay_name
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.outcome import Outcome
-from harness.replay.selection import MOST_FAILURES_PER_ARM, choose_games, replay_name
 from harness.reports.manoeuvres import MOST_LISTED
 from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.chromium import launched, opener, ready_s, until
