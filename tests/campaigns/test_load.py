@@ -130,7 +130,7 @@ def assessment() -> Iterator[Weight]:
         for first in range(0, ASSESSED, GAMES_PER_FILE):
             if first % (ASSESSED // WEIGHED) == 0:
                 yield Weight.now(first)
-            with trace_writer(folder / "traces.parquet") as add_trace:
+            with trace_writer(folder / "traces.parquet", SCHEMA) as add_trace:
                 for _ in range(GAMES_PER_FILE):
                     game = next(games)
                     assert game.record["ego_outcome"] == "goal"
