@@ -9,9 +9,9 @@ import numpy as np
 
 from harness.evaluation.column import SHARE
 from harness.evaluation.metrics import Drive, finite, metric
-from harness.evaluation.rule_book.course import runs
+from harness.evaluation.rule_book.course import nearest_lane_m, runs
 from harness.evaluation.rule_book.thresholds import LANE_CHANGE_M
-from harness.game.arrays import FloatArray
+from harness.game.arrays import BoolArray, FloatArray
 
 FOLLOWS_S = 3.0
 """Largest gap over own speed at which a player follows its leader."""
@@ -35,9 +35,7 @@ def _in_lane(drive: Drive) -> tuple[FloatArray, FloatArray]:
     """[N] the centre of the nearest lane in each step, and the place of the player, both from the route's line."""
     routes, place_m = drive.game.quantities.world.road.routes, drive.of("lateral_offset_m")
     rows = drive.game.while_driving(routes.rows(drive.game.quantities.state.station_m), drive.player)
-    away_m = np.abs(routes.lane_offset_m[rows] - place_m[:, None])
-    lane = np.where(np.isnan(away_m), np.inf, away_m).argmin(1)
-    return routes.lane_offset_m[rows, lane], place_m
+    return nearest_lane_m(routes.lane_offset_m[rows], place_m), place_m
 
 
 def lane_changes(drive: Drive) -> list[LaneChange]:
@@ -145,7 +143,7 @@ def looks_away_share(drive: Drive) -> float | None:
 
 @metric("conduct", meaning="Longest lapse of attention; empty without one.")
 def longest_lapse_s(drive: Drive) -> float | None:
-    lengths = [last - first + 1 for first, last in runs(_lapsed(drive).astype(bool))]
+    lengths = [last - first + 1 for first, last in runs(_lapsed(drive))]
     return max(lengths) * drive.step_s if lengths else None
 
 
@@ -154,10 +152,10 @@ def longest_lapse_s(drive: Drive) -> float | None:
     meaning="Time at the end of the player's game in which it made no decision, because its attention had lapsed.",
 )
 def undecided_at_end_s(drive: Drive) -> float | None:
-    decided = np.flatnonzero(~_lapsed(drive).astype(bool))
-    steps = len(_lapsed(drive))
+    lapsed = _lapsed(drive)
+    decided, steps = np.flatnonzero(~lapsed), len(lapsed)
     return (steps - 1 - int(decided[-1]) if len(decided) else steps) * drive.step_s if steps else None
 
 
-def _lapsed(drive: Drive) -> FloatArray:
+def _lapsed(drive: Drive) -> BoolArray:
     return drive.game.while_driving(drive.game.quantities.state.lapsed, drive.player)

@@ -58,6 +58,9 @@ PREVENTABILITY = (
 )
 
 _MCNEMAR = Column("p", NUMBER, "McNemar's exact test of these pairs, two-sided.", unit=P_VALUE, label="p")
+_MCNEMAR_OF_FAILURES = Column(
+    "mcnemar_p", NUMBER, "McNemar's exact test of these failures, two-sided.", unit=P_VALUE, label="McNemar p"
+)
 _HOLM = Column("p_holm", NUMBER, "Corrected for all tests of the table.", unit=P_VALUE, source="Holm 1979")
 
 
@@ -244,7 +247,7 @@ SHIELDS = (
     *rate("failure_rate", "Share of the pairs in which the ego fails without the shield."),
     *rate("shielded_failure_rate", "The same with the shield."),
     *Column("fewer_failures", NUMBER, "Mean of without minus with the shield.", unit=POINTS).with_interval(_T),
-    Column("mcnemar_p", NUMBER, "McNemar's exact test of these failures, two-sided.", unit=P_VALUE, label="McNemar p"),
+    _MCNEMAR_OF_FAILURES,
     *Column("speed_loss_mps", NUMBER, "Mean speed of the ego without minus with it.", unit="m/s").with_interval(_T),
     Column("shield_interventions_per_km", NUMBER, "Mean over the games with it.", unit="1/km"),
     Column("shielded_share", NUMBER, "Mean over the games with it: the share of steps.", unit=SHARE),
@@ -253,16 +256,10 @@ SHIELDS = (
 PERCEPTION = (
     *rate("failure_rate", "Share of the pairs in which the ego fails with its perception errors."),
     *rate("error_free_failure_rate", "The same without them."),
-    *Column("more_failures", NUMBER, "Mean of with minus without the errors.", unit=POINTS).with_interval(
-        "95 % t interval"
-    ),
-    Column("mcnemar_p", NUMBER, "McNemar's exact test of these failures, two-sided.", unit=P_VALUE, label="McNemar p"),
-    Column(
-        "p_holm", NUMBER, "mcnemar_p, corrected for all rows.", unit=P_VALUE, label="p after Holm", source="Holm 1979"
-    ),
-    *Column("speed_loss_mps", NUMBER, "Mean speed of the ego without minus with them.", unit="m/s").with_interval(
-        "95 % t interval"
-    ),
+    *Column("more_failures", NUMBER, "Mean of with minus without the errors.", unit=POINTS).with_interval(_T),
+    _MCNEMAR_OF_FAILURES,
+    replace(_HOLM, meaning="mcnemar_p, corrected for all rows.", label="p after Holm"),
+    *Column("speed_loss_mps", NUMBER, "Mean speed of the ego without minus with them.", unit="m/s").with_interval(_T),
     Column("lost_share", NUMBER, "Mean over the games with them: the share of steps with a loss.", unit=SHARE),
     Column("ghost_share", NUMBER, "Mean over the games with them: the share of steps with a ghost.", unit=SHARE),
 )

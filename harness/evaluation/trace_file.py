@@ -12,7 +12,6 @@ from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -50,7 +49,7 @@ _NUMBERS = [field.name for field in SCHEMA if field.type == pa.float64()]
 
 
 @contextmanager
-def trace_writer(path: Path, schema: pa.Schema = SCHEMA) -> Iterator[Callable[[Mapping[str, Sequence[Any]]], None]]:
+def trace_writer(path: Path, schema: pa.Schema) -> Iterator[Callable[[Mapping[str, Sequence[Any]]], None]]:
     """Writes the games of a segment: a function that adds one, as columns of its trace. The file appears only when all
     games are in it. `schema`: as `schema_of`."""
     games: list[pa.Table] = [schema.empty_table()]
@@ -64,17 +63,16 @@ def trace_writer(path: Path, schema: pa.Schema = SCHEMA) -> Iterator[Callable[[M
     _write([pa.concat_tables(games).unify_dictionaries().combine_chunks()], path, schema)
 
 
-def join_traces(parts: Sequence[Path], path: Path, labels: Mapping[str, str | int] = MappingProxyType({})) -> None:
+def join_traces(parts: Sequence[Path], path: Path, labels: Mapping[str, str | int]) -> None:
     """Concatenate the traces of segments in one file.
 
     `labels` (the arm and its seed) are the file's metadata: `pandas.read_parquet(path).attrs` has them.
     """
     metadata: dict[bytes | str, bytes | str] = {name: str(label) for name, label in labels.items()}
-    if labels:
-        metadata["PANDAS_ATTRS"] = json.dumps(dict(labels))
+    metadata["PANDAS_ATTRS"] = json.dumps(dict(labels))
     names = pq.read_schema(parts[0]).names
     schema = schema_of(shielded=SHIELDED.name in names, perceiving=PERCEIVED[0].name in names)
-    _write((group for part in parts for group in _row_groups(part)), path, schema.with_metadata(metadata or None))
+    _write((group for part in parts for group in _row_groups(part)), path, schema.with_metadata(metadata))
 
 
 def read_traces(path: Path) -> Iterator[tuple[int, pd.DataFrame]]:
@@ -144,7 +142,7 @@ def _segments_of(path: Path) -> list[_Segment]:
     return [(span["min"], span["max"], segment) for span, segment in spans]
 
 
-def _write(groups: Iterable[pa.Table], path: Path, schema: pa.Schema = SCHEMA) -> None:
+def _write(groups: Iterable[pa.Table], path: Path, schema: pa.Schema) -> None:
     scratch = scratch_beside(path)
     try:
         with errors_naming(path):

@@ -1,9 +1,8 @@
-"""A recorded game as a folder that SUMO-GUI opens, or as a film; and the choice of games to record."""
+"""A recorded game as a folder that SUMO-GUI opens, or as a film."""
 
 from harness.replay.bundle import write_replay
 from harness.replay.film import write_film
-from harness.replay.selection import choose_games, replay_name
 from harness.replay.sumo_gui import follow_in_sumo_gui
 from harness.replay.vehicles import names_in_pictures
 
-__all__ = ["choose_games", "follow_in_sumo_gui", "names_in_pictures", "replay_name", "write_film", "write_replay"]
+__all__ = ["follow_in_sumo_gui", "names_in_pictures", "write_film", "write_replay"]

@@ -60,9 +60,7 @@ def _closest_approach(trace: pd.DataFrame) -> np.ndarray:
     return pairs.loc[distance.idxmin(), ["x_m", "y_m"]].to_numpy(float)
 
 
-def view_settings(
-    view: Viewport, halts_s: Sequence[float], lanes: Lanes, *, signals: bool = False
-) -> ElementTree.Element:
+def view_settings(view: Viewport, halts_s: Sequence[float], lanes: Lanes, *, signals: bool) -> ElementTree.Element:
     """SUMO-GUI's settings file. It halts at these times of its own clock, and continues with "play".
 
     With `signals`, the state of the traffic lights is drawn at the ends of the lanes.

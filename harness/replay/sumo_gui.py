@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from harness.errors import HarnessError, Problem, UsageError
-from harness.sumo.gui import end_process
+from harness.sumo.gui import WindowClosed, end_process, gui_environment, steered_gui
 
 FOLLOWED_M = (80.0, 40.0)  # of road around the ego: a car of 4.6 m is then 73 pixels long
 _EGO = "ego"
@@ -23,15 +23,13 @@ NO_SUMO_GUI = Problem("sumo-gui", "", "is not installed", "pip install eclipse-s
 _END = re.compile(r'<(end|step-length) value="([0-9.]+)"')
 
 
-def follow_in_sumo_gui(folder: Path, opened: Callable[[], None] = lambda: None) -> None:
+def follow_in_sumo_gui(folder: Path, opened: Callable[[], None]) -> None:
     """Play a replay folder in SUMO-GUI with the view following the ego; return when the user closes SUMO-GUI.
 
     `opened` is called when the window is open. SUMO-GUI has no setting for the followed vehicle in a file, only a
     command over TraCI. Raises UsageError, with the remedy, when the folder is not a replay, when there is no SUMO-GUI
     or no screen; SimulationError if SUMO-GUI can't start.
     """
-    from harness.sumo.gui import WindowClosed, gui_environment, steered_gui
-
     configuration, program, problems = folder / "scene.sumocfg", find_sumo_gui(), list[Problem]()
     if not configuration.is_file():
         remedy = "`harness replay RUN --list` lists the games"

@@ -12,6 +12,7 @@ from harness.config.traits import TRAITS
 from harness.evaluation.competence import ALL_TRAITS
 from harness.evaluation.strategies import NaiveEgo, against_persona
 from harness.reports.embedding import key
+from harness.reports.figures import GAME
 from harness.reports.game_links import GameLinks
 from harness.reports.numbers import MISSING, NO_SPACE, p_number, signed
 from harness.reports.run_tables import Row, RunTables
@@ -105,7 +106,7 @@ def _pair_address(rows: pd.DataFrame, links: GameLinks) -> str:
     for row in rows[rows["example"].notna()].to_dict("records"):
         own, other = (key(row[arm], row["seed"], int(row["example"])) for arm in ("arm", "without_arm"))
         if own in links.embedded:
-            return f"#game={own}" + (f"&with={other}" if other in links.embedded else "")
+            return f"{GAME}{own}" + (f"&with={other}" if other in links.embedded else "")
     return ""
 
 

@@ -7,7 +7,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING
 
 from harness.reports.comparison_page import BETTER, CHANGES, WORSE, ComparedRow, Comparison, Transition
-from harness.reports.numbers import MISSING, NO_SPACE, interval
+from harness.reports.numbers import MISSING, NO_SPACE
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -45,12 +45,8 @@ def history_table(comparison: Comparison, width: int) -> Table:
 
 def _cells(history: PersonHistory, place: int) -> tuple[str, str]:
     """The failures of a run over all training seeds, and the interval of one."""
-    rates = list(history.rates[place].values())
-    if not rates:
-        return MISSING, ""
-    counts = f"{sum(each.failures for each in rates)} of {sum(each.games for each in rates)}"
-    only = interval(rates[0].low, rates[0].high).replace(NO_SPACE, " ") if len(rates) == 1 else f"{len(rates)} seeds"
-    return counts, only
+    counts = history.counts(place)
+    return (counts, history.interval(place).replace(NO_SPACE, " ")) if counts else (MISSING, "")
 
 
 def difference_table(rows: Sequence[ComparedRow]) -> Table:

@@ -153,24 +153,20 @@ def _is_answer(arm: Arm) -> bool:
 
 def _cell(names: Sequence[str], tables: RunTables, links: GameLinks, named: bool = False) -> FailureCell | None:
     """The worst of some arms, with its name if `named`; None if none of them was played."""
-    found = {name: list(tables.rates_of(name).values()) for name in names}
-    found = {name: rows for name, rows in found.items() if rows}
-    if not found:
+    counts = {name: tables.counts_of(name) for name in names}
+    shares = {name: failed / games for name, (failed, games) in counts.items() if games}
+    if not shares:
         return None
-    name, rows = max(found.items(), key=lambda each: _share(each[1]))
-    failed, games = sum(map(failures, rows)), sum(map(played, rows))
+    name = max(shares, key=lambda each: shares[each])
+    (failed, games), rows = counts[name], list(tables.rates_of(name).values())
     return FailureCell(
-        rate=percent(failed / games),
+        rate=percent(shares[name]),
         counts=f"{failed:,} of {games:,}",
         spans=[(row["failure_rate"], row["failure_rate_low"], row["failure_rate_high"]) for row in rows],
         tone=_tone(rows),
         game=links.worst(name) if failed else "",
         arm=name if named and failed else "",
     )
-
-
-def _share(rows: Sequence[Row]) -> float:
-    return sum(map(failures, rows)) / sum(map(played, rows))
 
 
 def _tone(rows: Sequence[Row]) -> str:

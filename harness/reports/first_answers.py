@@ -15,7 +15,7 @@ from harness.evaluation.rule_book.causes import cause_lines
 from harness.evaluation.strategies import PAPER_ROUNDS, NaiveEgo, against_persona, round_of
 from harness.reports.embedding import key
 from harness.reports.focus import Focus, focus_of
-from harness.reports.key_figures import egos_of
+from harness.reports.key_figures import egos_of, prevented_clauses
 from harness.reports.next_steps import NextStep
 from harness.reports.numbers import NO_SPACE, number
 from harness.reports.run_tables import RunTables
@@ -117,12 +117,7 @@ def _prevented(where: str, arms: Mapping[str, str], tables: RunTables) -> Iterat
     """What the driver of the regulation prevents, for each ego that fails."""
     clauses, not_judged = [], []
     for arm, made in arms.items():
-        rows = tables.prevented_in(arm)
-        found = []
-        for verdict, when in _VERDICTS.items():
-            prevented, judged = (sum(row[f"{verdict}_{count}"] for row in rows) for count in ("prevented", "judged"))
-            found += [f"{prevented} of {judged} {when}"] if judged else []
-        if found:
+        if found := prevented_clauses(arm, _VERDICTS, tables):
             clauses.append(f"{made} {', '.join(found)}")
         elif tables.counts_of(arm)[0]:
             not_judged.append(made)

@@ -11,8 +11,9 @@ from typing import Any
 import pandas as pd
 
 from harness.evaluation.people import COLLIDED_WITH, judged
-from harness.evaluation.worst_first import worst_first
+from harness.evaluation.worst_first import replay_name, worst_first
 from harness.reports.embedding import key
+from harness.reports.figures import GAME
 from harness.reports.numbers import NO_SPACE, number
 
 OUTCOMES = {"rail": "contact with the rail", "timeout": "out of time", "goal": "goal reached"}
@@ -30,7 +31,7 @@ class GameLinks:
     def of(self, rows: pd.DataFrame) -> list[str]:
         """An address for each row's game, empty for a game that the page does not contain."""
         keys = map(key, rows["arm"].tolist(), rows["seed"].tolist(), rows["episode"].tolist())
-        return [f"#game={name}" if name in self.embedded else "" for name in keys]
+        return [f"{GAME}{name}" if name in self.embedded else "" for name in keys]
 
     def worst(self, arm: str) -> str:
         """The address of the worst game of an arm that the page contains; empty without one."""
@@ -79,7 +80,7 @@ def replay_command(game: Mapping[Any, Any], several_seeds: bool) -> str:
 
 
 def _name(game: Mapping[Any, Any]) -> str:
-    return f"{game['arm']}-seed{game['seed']}-{game['episode']:03d}"
+    return replay_name(game["arm"], game["seed"], game["episode"])
 
 
 def _key(game: Mapping[Any, Any]) -> str:

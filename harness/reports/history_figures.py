@@ -20,7 +20,7 @@ from harness.evaluation.strategies import (
 )
 from harness.reports.failure_table import NOBODY, ORDINARY
 from harness.reports.figures import SERIES, figure_of, svg
-from harness.reports.numbers import NO_SPACE, percent
+from harness.reports.numbers import interval
 
 MOST_PEOPLE_SHOWN = 8
 """Of an ego; of more, those against which it fails most."""
@@ -39,6 +39,16 @@ class PersonHistory:
     rates: Sequence[Mapping[int, FailureRate]]
     """For each run by training seed; empty where the run has not played it."""
 
+    def counts(self, place: int) -> str:
+        """Failures and games of a run, over all training seeds; empty where it was not played."""
+        rates = self.rates[place].values()
+        return f"{sum(each.failures for each in rates)} of {sum(each.games for each in rates)}" if rates else ""
+
+    def interval(self, place: int) -> str:
+        """The interval of the only training seed of a run; of several, their number."""
+        rates = list(self.rates[place].values())
+        return interval(rates[0].low, rates[0].high) if len(rates) == 1 else f"{len(rates)} seeds"
+
     def share(self, place: int) -> float:
         """The share of failures in a run, over all training seeds; NaN where it was not played."""
         rates = self.rates[place].values()
@@ -47,14 +57,10 @@ class PersonHistory:
 
     def text(self, place: int) -> str:
         """The cell of a run: counts over all training seeds, and the interval of the only one."""
-        rates = list(self.rates[place].values())
-        if not rates:
+        counts, ends = self.counts(place), self.interval(place)
+        if not counts:
             return ""
-        failures, games = sum(each.failures for each in rates), sum(each.games for each in rates)
-        text = f"{failures} of {games}"
-        if len(rates) > 1:
-            return f"{text}, {len(rates)} seeds"
-        return f"{text} ({percent(rates[0].low).removesuffix(f'{NO_SPACE}%')}–{percent(rates[0].high)})"
+        return f"{counts} ({ends})" if len(self.rates[place]) == 1 else f"{counts}, {ends}"
 
 
 def histories(

@@ -65,15 +65,19 @@ def _preventable(persona: str, tables: RunTables) -> Iterator[KeyFigure]:
         "moving_over": "if the other moves on into its line",
         "from_start": "from the start",
     }
-    lines = []
-    for _, made, arm in egos_of(persona, tables):
-        rows = tables.prevented_in(arm)
-        judged = {verdict: sum(row[f"{verdict}_judged"] for row in rows) for verdict in verdicts}
-        prevented = {verdict: sum(row[f"{verdict}_prevented"] for row in rows) for verdict in verdicts}
-        clauses = [f"{prevented[each]} of {judged[each]} {words}" for each, words in verdicts.items() if judged[each]]
-        if clauses:
-            lines.append(f"{made}: {', '.join(clauses)}")
+    found = {made: prevented_clauses(arm, verdicts, tables) for _, made, arm in egos_of(persona, tables)}
+    lines = [f"{made}: {', '.join(clauses)}" for made, clauses in found.items() if clauses]
     yield KeyFigure(title="Preventable by the careful and competent driver of UN R157", lines=lines)
+
+
+def prevented_clauses(arm: str, verdicts: Mapping[str, str], tables: RunTables) -> list[str]:
+    """How many failures of an arm the driver of the regulation prevents, such as "3 of 7 from the start", for each of
+    the verdicts of preventability.csv, in words, that a failure has."""
+    rows, clauses = tables.prevented_in(arm), []
+    for verdict, words in verdicts.items():
+        prevented, judged = (sum(row[f"{verdict}_{count}"] for row in rows) for count in ("prevented", "judged"))
+        clauses += [f"{prevented} of {judged} {words}"] if judged else []
+    return clauses
 
 
 def _severity(persona: str, tables: RunTables) -> Iterator[KeyFigure]:

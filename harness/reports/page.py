@@ -96,7 +96,7 @@ def render_page(
         recorded=recorded_document(scene, texts.values()),
         pairs=None if tables.manoeuvres is None else pairs,
         pair_arms=arms,
-        learning=learning(tables),
+        curves=learning(tables),
         searches=searches(tables.reconfiguration),
         **_tables(tables),
         replays=links.replays(tables.replays, REPLAYS_SHOWN),

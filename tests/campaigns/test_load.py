@@ -37,9 +37,9 @@ from harness.environments.arena import Arena, Seat
 from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.tables import table_of, typed
 from harness.evaluation.trace_file import SCHEMA, trace_writer
+from harness.evaluation.worst_first import MOST_FAILURES_PER_ARM, choose_games, replay_name
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.outcome import Outcome
-from harness.replay.selection import MOST_FAILURES_PER_ARM, choose_games, replay_name
 from harness.reports.manoeuvres import MOST_LISTED
 from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.chromium import launched, opener, ready_s, until
@@ -130,7 +130,7 @@ def assessment() -> Iterator[Weight]:
         for first in range(0, ASSESSED, GAMES_PER_FILE):
             if first % (ASSESSED // WEIGHED) == 0:
                 yield Weight.now(first)
-            with trace_writer(folder / "traces.parquet") as add_trace:
+            with trace_writer(folder / "traces.parquet", SCHEMA) as add_trace:
                 for _ in range(GAMES_PER_FILE):
                     game = next(games)
                     assert game.record["ego_outcome"] == "goal"

@@ -19,7 +19,7 @@ from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.competence import Question
 from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import TraceReader
-from harness.replay import replay_name
+from harness.evaluation.worst_first import replay_name
 from harness.road.scene.open_scene import open_scene
 from tests.support.replays import assert_plays
 from tests.support.tiny import (

@@ -12,7 +12,7 @@ import pytest
 
 from harness.config.campaign import Campaign
 from harness.config.toml_reading import read_document
-from harness.evaluation.trace_file import trace_writer
+from harness.evaluation.trace_file import SCHEMA, trace_writer
 from harness.road.scene.open_scene import OpenScene
 from tests.support.repository import REPOSITORY
 from tests.support.scripts import script
@@ -43,7 +43,7 @@ def measured(name: str, scene: OpenScene, *traces: pd.DataFrame) -> float:
 def write(file: Path, scene: OpenScene, trace: pd.DataFrame) -> None:
     """Write a file of traces with one game."""
     file.parent.mkdir(exist_ok=True)
-    with trace_writer(file) as add_trace:
+    with trace_writer(file, SCHEMA) as add_trace:
         add_trace(game(scene.world, trace).trace.to_dict("list"))
 
 

@@ -23,7 +23,7 @@ def game(episode: int, steps: int = 3) -> dict[str, list[Any]]:
 
 
 def write(path: Path, *games: dict[str, list[Any]]) -> None:
-    with trace_writer(path) as add_trace:
+    with trace_writer(path, SCHEMA) as add_trace:
         for each in games:
             add_trace(each)
 
@@ -53,7 +53,7 @@ def test_reader__keeps_segments_unchanged(most_rows: int, tmp_path: Path, monkey
     parts, arm = [tmp_path / name for name in ("0", "1")], tmp_path / "arm.parquet"
     write(parts[0], game(0), game(1, steps=5))
     write(parts[1], game(2, steps=4), game(3))
-    join_traces(parts, arm)
+    join_traces(parts, arm, {"arm": "naive_alone", "seed": 1})
     reader = TraceReader()
     for episode in (3, 0, 1, 7, 2, 3):
         found = reader.read(arm, episode)
@@ -82,7 +82,7 @@ def test_trace_writer__an_interrupted_arm_keeps_the_old_file(tmp_path: Path) -> 
     before = file.read_bytes()
 
     def cut_short() -> None:
-        with trace_writer(file) as add_trace:
+        with trace_writer(file, SCHEMA) as add_trace:
             add_trace(game(0))
             raise RuntimeError("cut short")
 

@@ -12,8 +12,7 @@ from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.competence import WITHHELD, Verdict
 from harness.evaluation.realism import CRASHES, DECLARED
 from harness.evaluation.tables import table_of
-from harness.evaluation.worst_first import worst_first
-from harness.replay.selection import choose_games, replay_name
+from harness.evaluation.worst_first import choose_games, replay_name, worst_first
 from harness.reports import page as page_module
 from harness.reports.differences import CHANCE, NO_T_STATISTIC, effect, p_values, speed_sentence
 from harness.reports.numbers import duration, number, p_number, p_text, percent, signed

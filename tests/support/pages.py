@@ -34,7 +34,7 @@ from harness.evaluation.strategies import (
     strategy_name,
 )
 from harness.evaluation.tables import table_of, typed
-from harness.replay.selection import choose_games, replay_name
+from harness.evaluation.worst_first import choose_games, replay_name
 from harness.reports.embedding import GameTracks
 from harness.reports.page import render_page
 from harness.reports.run_tables import RunTables

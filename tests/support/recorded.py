@@ -9,9 +9,8 @@ import numpy as np
 import pandas as pd
 
 from harness.evaluation.tables import table_of
-from harness.evaluation.worst_first import worst_first
+from harness.evaluation.worst_first import choose_games, worst_first
 from harness.game.arrays import FloatArray
-from harness.replay.selection import choose_games
 from harness.reports.embedding import COLUMNS, REFERENCE_COLUMNS, GameTracks, Reference, Track
 
 PREVENTED = 9

@@ -16,11 +16,10 @@ from harness.evaluation.comparisons.preventability import TAKES_OVER
 from harness.evaluation.people import judged, judged_outcomes
 from harness.evaluation.strategies import Arm, counterparts
 from harness.evaluation.trace_file import TraceReader
-from harness.evaluation.worst_first import worst_first
+from harness.evaluation.worst_first import choose_games, worst_first
 from harness.game.arrays import FloatArray
 from harness.game.roles import EGO
 from harness.game.sight import TALL_WIDTH_M
-from harness.replay import choose_games
 from harness.replay.contacts import contacts
 from harness.replay.vehicles import DrawnVehicle, presences, types_of_vehicles
 from harness.reports.embedding import BACKGROUND_COLUMNS, COLUMNS, REFERENCE_COLUMNS, GameTracks, Reference, Track

@@ -25,8 +25,8 @@ from harness.evaluation.people import people_in
 from harness.evaluation.rule_book.causes import causes_in_words
 from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import TraceReader
-from harness.evaluation.worst_first import FAILURES, worst_first
-from harness.replay import follow_in_sumo_gui, names_in_pictures, replay_name, write_film, write_replay
+from harness.evaluation.worst_first import FAILURES, replay_name, worst_first
+from harness.replay import follow_in_sumo_gui, names_in_pictures, write_film, write_replay
 from harness.replay.vehicles import legend
 from harness.road.scene.open_scene import OpenScene, open_scene
 

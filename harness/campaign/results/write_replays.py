@@ -11,8 +11,7 @@ from harness.campaign.results.replay_game import read_game
 from harness.campaign.results.shown_work import progress_bar, say
 from harness.campaign.storage.run_folder import RunFolder
 from harness.evaluation.trace_file import TraceReader
-from harness.evaluation.worst_first import worst_first
-from harness.replay import choose_games
+from harness.evaluation.worst_first import choose_games, worst_first
 from harness.road.scene.open_scene import OpenScene
 
 WRITING_REPLAYS = "writing replays"

@@ -13,8 +13,8 @@ from functools import lru_cache
 import numpy as np
 
 from harness.evaluation.rule_book import thresholds as at
-from harness.evaluation.rule_book.course import SLACK, Course, Span
-from harness.game.arrays import BoolArray, FloatArray, IntArray
+from harness.evaluation.rule_book.course import SLACK, Course, Span, end_of_run, nearest_lane_m
+from harness.game.arrays import BoolArray, FloatArray
 
 WALKS, RIDES, DRIVES = "walks", "rides", "drives"
 _MOVES = {"pedestrian": WALKS, "wheelchair": WALKS, "bicycle": RIDES, "scooter": RIDES}  # by class
@@ -118,8 +118,7 @@ def entries(course: Course, body: int, of: int) -> Iterator[tuple[str, Span]]:
 def _settled(lane: InLane, left_m: FloatArray, step: int) -> int:
     """The first step in which a body that entered is within half a metre of the player's path; the last one in the lane
     if it never is."""
-    outside = np.flatnonzero(~lane.inside[step:])
-    last = step + int(outside[0]) - 1 if len(outside) else len(lane.inside) - 1
+    last = end_of_run(lane.inside, step)
     found = np.flatnonzero(np.abs(left_m[step : last + 1]) < 0.5)
     return step + int(found[0]) if len(found) else last
 
@@ -129,9 +128,7 @@ def _lane(lanes_m: FloatArray, offset_m: FloatArray) -> tuple[FloatArray, FloatA
 
     lanes_m [T, L] are the centres of lanes (NaN: none), offset_m [T].
     """
-    away = np.abs(lanes_m - offset_m[:, None])
-    nearest: IntArray = np.where(np.isnan(away), np.inf, away).argmin(1)
-    centre = lanes_m[np.arange(len(lanes_m)), nearest]
+    centre = nearest_lane_m(lanes_m, offset_m)
     side = lanes_m - centre[:, None]
     left = np.where(side > 0.1, side, np.inf).min(1)
     right = np.where(side < -0.1, side, -np.inf).max(1)

@@ -16,7 +16,7 @@ import numpy as np
 
 from harness.evaluation.encounters import Encounter
 from harness.evaluation.rule_book import thresholds as least
-from harness.evaluation.rule_book.course import SLACK, Course, Span, runs
+from harness.evaluation.rule_book.course import SLACK, Course, Span, end_of_run, runs
 from harness.evaluation.rule_book.lane_entries import ENTRIES, entries
 from harness.game.arrays import BoolArray
 from harness.game.junctions import Control, Signal
@@ -80,7 +80,7 @@ def overtakes(course: Course, player: int, other: int) -> Iterator[Span]:
     search_from = 0
     for step in np.flatnonzero(draws_level).tolist():
         behind = np.flatnonzero(ahead[search_from:step] <= -least.OVERTAKE_FROM_M + SLACK)
-        last = _while(both & (ahead >= 0.0), step)
+        last = end_of_run(both & (ahead >= 0.0), step)
         past = np.flatnonzero(gap[step : last + 1] >= 0.0)
         if len(behind) and len(past):
             length = ahead[step] - gap[step]
@@ -118,12 +118,6 @@ def forced_stops(course: Course, player: int) -> Iterator[Span]:
             f"{gap[first]:.1f} m behind another" if behind[first] else f"{lane_end[first]:.1f} m before its lane ends"
         )
         yield course.span(player, first, last, f"is brought to {speed[first : last + 1].min():.1f} m/s, {where}")
-
-
-def _while(mask: BoolArray, step: int) -> int:
-    """The last step of the stretch of `mask` [T] that `step` is in."""
-    ends = np.flatnonzero(~mask[step:])
-    return step + int(ends[0]) - 1 if len(ends) else len(mask) - 1
 
 
 # --- junctions and oncoming lanes ------------------------------------------------------------------------------------

@@ -30,11 +30,11 @@ def render_profile(profile: PersonaProfile) -> str:
     functions = []
     for k, each in enumerate(profile.functions, 1):
         words = function_in_words(each)
-        functions.append((each, words, function_figure(each, f"function{k}", f"{each.name}: {words}")))
+        functions.append((each, words, _function_figure(each, f"function{k}", f"{each.name}: {words}")))
     lapses = None
     if profile.persona.human_factors.attention is not None:
         alternative = f"Lapses of attention in {len(profile.drives)} drives of {DRIVE_S:g} s"
-        lapses = drives_figure(profile.drives, "drives", alternative)
+        lapses = _drives_figure(profile.drives, alternative)
     page = (
         environment_of("reports/persona", "reports")
         .get_template("profile.html.jinja")
@@ -50,7 +50,7 @@ def render_profile(profile: PersonaProfile) -> str:
     return page.strip() + "\n"
 
 
-def function_figure(function: PayoffFunction, name: str, alternative: str) -> Markup:
+def _function_figure(function: PayoffFunction, name: str, alternative: str) -> Markup:
     """The memberships of a function's sets above, the payoff over the quantity below."""
     with figure_of(6.4, 4.6) as figure:
         memberships, worth = figure.subplots(2, 1, sharex=True, height_ratios=(2, 3))
@@ -71,7 +71,7 @@ def function_figure(function: PayoffFunction, name: str, alternative: str) -> Ma
         return svg(figure, name, alternative)
 
 
-def drives_figure(drives: Sequence[SampleDrive], name: str, alternative: str) -> Markup:
+def _drives_figure(drives: Sequence[SampleDrive], alternative: str) -> Markup:
     """A row for each drive, with its lapses as bars over time."""
     with figure_of(9.6, 0.9 + 0.34 * len(drives)) as figure:
         axes = figure.subplots()
@@ -87,4 +87,4 @@ def drives_figure(drives: Sequence[SampleDrive], name: str, alternative: str) ->
         axes.invert_yaxis()
         axes.set_xlim(0, DRIVE_S)
         axes.set_xlabel("time (s)")
-        return svg(figure, name, alternative)
+        return svg(figure, "drives", alternative)

@@ -16,7 +16,7 @@ from harness.campaign.results.results import write_results
 from harness.campaign.storage.run_folder import RunFolder
 from harness.errors import UsageError
 from harness.evaluation.tables import table_of, write_csv
-from harness.replay import replay_name
+from harness.evaluation.worst_first import replay_name
 from tests.support.pictures import require_gui
 
 
