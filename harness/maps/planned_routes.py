@@ -20,6 +20,7 @@ from harness.maps.candidates import Candidate, LaneWay, for_cars
 from harness.road.net.lane_route import LaneRoute
 from harness.road.net.network import lane_line
 from harness.road.net.route_table import route_line
+from harness.road.net.surface import stations_of
 
 BEYOND_M = 45.0  # of the goal behind the junction
 _ROOM_M = 8.0  # behind a goal, at the end of the last edge
@@ -89,7 +90,7 @@ def _with_goal(net: Net, edges: Sequence[Edge], place: int) -> PlannedRoute | No
         points, starts = route_line(net, LaneRoute(edges))
     except ValueError:
         return None
-    length_m = float(_stations(points)[-1])
+    length_m = float(stations_of(points)[-1])
     ends = [*starts[1::2], length_m]  # of the edges
     has_junction = place + 1 < len(edges)
     begin_m = starts[2 * place + 2] if has_junction else 0.0
@@ -135,13 +136,9 @@ def _turn_deg(before: Edge, behind: Edge) -> float:
     return abs(float(np.degrees(np.arctan2(x * next_y - y * next_x, x * next_x + y * next_y))))
 
 
-def _stations(points: FloatArray) -> FloatArray:
-    return np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
-
-
 def sampled_to(points: FloatArray, until_m: float) -> FloatArray:
     """[n, 2] points every `SPACING_M` up to a station of the line through `points` [m, 2]."""
-    wanted, stations = np.arange(0.0, until_m + 1e-6, SPACING_M), _stations(points)
+    wanted, stations = np.arange(0.0, until_m + 1e-6, SPACING_M), stations_of(points)
     return np.stack([np.interp(wanted, stations, each) for each in points.T], axis=1)
 
 

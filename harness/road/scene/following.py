@@ -30,7 +30,6 @@ FOLLOWER_XML = (
 )
 """SUMO's default driver, who keeps the speed limit and stays in its lane; without SUMO's random numbers, which the
 games of an arena share."""
-_CLASS = "passenger"
 _CAR_LENGTH_M, _CAR_WIDTH_M = CAR_SIZE_M
 _ON_LANE_M = 2.0  # an ego that is farther from the middle of every lane is followed by nobody
 _AHEAD_M = 0.5
@@ -125,9 +124,9 @@ def road_behind(files: SceneFiles) -> RoadBehind:
     """The road on which the ego may be followed: that of its route. Where a car may not drive on all of it, none is."""
     net = files.net
     edges = [net.getEdge(name) for name in files.routes.vehicles[files.document.vehicles[EGO]].edges]
-    if not all(edge.allows(_CLASS) for edge in edges):
+    if not all(network.car_lanes(edge) for edge in edges):
         return NO_ROAD
-    lanes = {lane.getID(): _stretch(lane) for edge in edges for lane in edge.getLanes() if lane.allows(_CLASS)}
+    lanes = {lane.getID(): _stretch(lane) for edge in edges for lane in network.car_lanes(edge)}
     for edge, following in pairwise(edges):
         for lane in (each for each in edge.getLanes() if each.getID() in lanes):
             for link in (each for each in lane.getOutgoing() if each.getTo() is following):

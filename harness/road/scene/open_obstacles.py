@@ -31,6 +31,7 @@ from harness.game.state import NOTICED_M
 from harness.road.demand.departures import background_departures
 from harness.road.demand.route_file import RouteFile, VehicleType
 from harness.road.net import network
+from harness.road.net.surface import length_of
 from harness.road.scene.scene_files import SceneFiles
 
 _BENT_M = 0.5  # a closed lane is straight: its lane may leave the middle of the box by this much
@@ -110,7 +111,7 @@ def _on_lane(file: Path, name: str, document: written.Obstacle, *, lane: Lane, l
         remedy = f"keep it between {inside_m:g} and {lane.getLength() - inside_m:g} m"
         raise UsageError.of(file, f"{name}.position_m", f"{message} of {lane.getLength():g} m", remedy)
     line = network.lane_line(lane)
-    scale = float(np.hypot(*np.diff(line, axis=0).T).sum()) / lane.getLength()
+    scale = length_of(line) / lane.getLength()
     place = OnLane(
         line=line,
         position_m=document.position_m,
@@ -125,7 +126,7 @@ def _on_lane(file: Path, name: str, document: written.Obstacle, *, lane: Lane, l
 
 def _check_straight(file: Path, name: str, place: OnLane, length_m: float) -> None:
     lane = shapely.LineString(place.line)
-    for share in (0.0, 0.5, 1.0):
+    for share in _SHARES:
         x, y, heading = place.pose((share, 0.5, 0.5))
         reach = np.array([0.5 * length_m * np.cos(heading), 0.5 * length_m * np.sin(heading)])
         axis = shapely.LineString(np.array([x, y]) + np.array([-1.0, 1.0])[:, None] * reach)
