@@ -43,8 +43,12 @@ class OpenMap:
 
     @cached_property
     def reds_s(self) -> dict[str, float]:
-        """The longest red of each traffic light, by its id."""
-        return longest_reds_s(self.net_file)
+        """The longest time for which a link of each traffic light is yellow or red, by the light's id."""
+        reds: dict[str, float] = {}
+        for logic in parse_xml(self.net_file, lambda element: element.tag == "tlLogic"):
+            name = logic.get("id", "")
+            reds[name] = max(reds.get(name, 0.0), _longest_s(logic))
+        return reds
 
     def near(self, edge: str | None, within_m: float) -> list[GamePlan]:
         """The plans at junctions near an edge; None: all. Raises UsageError if there is no such edge."""
@@ -98,15 +102,6 @@ def open_map(
         whole_net=whole_net,
         traffic=traffic,
     )
-
-
-def longest_reds_s(net_file: Path) -> dict[str, float]:
-    """The longest time for which a link of each traffic light of a checked net is yellow or red, by the light's id."""
-    reds: dict[str, float] = {}
-    for logic in parse_xml(net_file, lambda element: element.tag == "tlLogic"):
-        name = logic.get("id", "")
-        reds[name] = max(reds.get(name, 0.0), _longest_s(logic))
-    return reds
 
 
 def _longest_s(logic: ElementTree.Element) -> float:

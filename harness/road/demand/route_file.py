@@ -7,12 +7,11 @@ game's generator: types and routes of distributions, and the times of random flo
 
 from __future__ import annotations
 
-import math
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import ceil
+from math import ceil, inf
 from pathlib import Path
 
 import numpy as np
@@ -61,7 +60,7 @@ class VehicleType:
     length_m: float = 5.0
     width_m: float = 1.8
     max_speed_mps: float = 55.55
-    desired_speed_mps: float = math.inf
+    desired_speed_mps: float = inf
     """The vType's desiredMaxSpeed. SUMO inserts no vehicle that is faster than this times its speed factor."""
     lane_changes: str = ""
     """The vType's laneChangeModel; empty: SUMO's default."""
@@ -161,6 +160,11 @@ class RouteFile:
     """The routes of trips: the edges for each vehicle type and trip."""
     warnings: tuple[str, ...] = ()
     """A line for each attribute that SUMO ignores."""
+
+    @property
+    def names(self) -> set[str]:
+        """Those of all vehicles, persons and flows."""
+        return {*self.vehicles, *(flow.departure.name for flow in self.flows)}
 
     def departures(
         self,

@@ -23,6 +23,7 @@ from sumolib.net.node import Node
 from harness.config.toml_reading import nearest
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray
+from harness.game.quantities import REACH_M
 from harness.game.rails import Rails
 from harness.road.net import surface
 from harness.road.net.surface import Part
@@ -236,10 +237,10 @@ def rail_lines(net: Net, area: BaseGeometry, own: Collection[Edge] = ()) -> list
     return [np.asarray(line.coords) for line in getattr(merged, "geoms", [merged]) if len(line.coords) > 1]
 
 
-def rails(lines: Sequence[FloatArray], reach_m: float) -> Rails:
-    """Rails of polylines [n, 2]. Look-ups find all segments within `reach_m` of a point."""
+def rails(lines: Sequence[FloatArray]) -> Rails:
+    """Rails of polylines [n, 2]. Look-ups find all segments that a player may notice."""
     segments = [np.stack((line[:-1], line[1:]), axis=1) for line in lines]
-    return Rails.of(np.concatenate(segments) if segments else np.zeros((0, 2, 2)), reach_m)
+    return Rails.of(np.concatenate(segments) if segments else np.zeros((0, 2, 2)), REACH_M + 10.0)
 
 
 def find_edge(net: Net, path: Path, key: str, name: str) -> Edge:

@@ -147,7 +147,7 @@ def _stretch(lane: Lane) -> _Stretch:
 def with_follower_type(routes: RouteFile) -> RouteFile:
     """The route file with the vehicle type of the follower, as traces name it. Raises UsageError if a vehicle of the
     file has the follower's name."""
-    if FOLLOWER in {*routes.vehicles, *(flow.departure.name for flow in routes.flows)}:
+    if FOLLOWER in routes.names:
         message = "is the name of the vehicle that follows the ego"
         raise UsageError.of(routes.path, FOLLOWER, message, "rename it, or give followed_share = 0 in scene.toml")
     return replace(routes, types={**routes.types, FOLLOWER_TYPE: VehicleType(name=FOLLOWER_TYPE)})

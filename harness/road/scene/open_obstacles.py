@@ -58,8 +58,7 @@ def open_obstacles(files: SceneFiles, area: BaseGeometry, ways: Sequence[Route])
         elif (obstacle := collect(problems, partial(_obstacle, file, name, each, files.net))) is not None:
             found.append(obstacle)
             collect(problems, partial(_check_is_near, file, name, reach_of(obstacle), lines))
-    taken = {each.name for each in found} & {*routes.vehicles, *(flow.departure.name for flow in routes.flows)}
-    for name in sorted(taken):
+    for name in sorted({each.name for each in found} & routes.names):
         problems.append(Problem(str(routes.path), name, "is the name of an obstacle of the scene", "rename it"))
     if problems:
         raise UsageError(problems)
