@@ -30,7 +30,7 @@ def follow_in_sumo_gui(folder: Path, opened: Callable[[], None] = lambda: None) 
     command over TraCI. Raises UsageError, with the remedy, when the folder is not a replay, when there is no SUMO-GUI
     or no screen; SimulationError if SUMO-GUI can't start.
     """
-    from harness.sumo.gui import WindowClosed, gui_environment, steered_gui
+    from harness.sumo.gui import WindowClosed, steered_gui
 
     configuration, program, problems = folder / "scene.sumocfg", find_sumo_gui(), list[Problem]()
     if not configuration.is_file():
@@ -45,7 +45,7 @@ def follow_in_sumo_gui(folder: Path, opened: Callable[[], None] = lambda: None) 
         raise UsageError(problems)
     options = dict(_END.findall(configuration.read_text(encoding="utf-8")))
     steps = round(float(options["end"]) / float(options["step-length"]))
-    with steered_gui(program, ["-c", str(configuration)], gui_environment(home_of(program))) as window:
+    with steered_gui(program, ["-c", str(configuration)]) as window:
         opened()
         try:
             following = False
@@ -77,12 +77,6 @@ def find_sumo_gui() -> Path | None:
             return Path(found)
     found = shutil.which("sumo-gui")
     return Path(found) if found else None
-
-
-def home_of(program: Path) -> Path:
-    """SUMO's folder with its data: the parent of `bin`, or another one in the layout of a Linux distribution."""
-    home = program.resolve().parent.parent
-    return home if (home / "data").is_dir() else Path(os.environ.get("SUMO_HOME", "/usr/share/sumo"))
 
 
 _STARTS_WITHIN_S = 30.0
