@@ -40,8 +40,8 @@ class Part:
     own: bool  # it belongs to the level that is kept where levels overlap
 
 
-def lane_shape(line: FloatArray, width_m: float) -> BaseGeometry:
-    """The area of a lane by its centre line [n, 2]."""
+def lane_shape(line: FloatArray | shapely.LineString, width_m: float) -> BaseGeometry:
+    """The area of a lane by its centre line, points [n, 2] or a shape."""
     return shapely.LineString(line).buffer(width_m / 2.0, cap_style="flat", join_style="mitre")
 
 
