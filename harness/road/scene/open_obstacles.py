@@ -31,6 +31,7 @@ from harness.game.state import NOTICED_M
 from harness.road.demand.departures import background_departures
 from harness.road.demand.route_file import RouteFile, VehicleType
 from harness.road.net import network
+from harness.road.net.right_of_way_table import extent_of
 from harness.road.net.surface import length_of
 from harness.road.scene.scene_files import SceneFiles
 
@@ -66,7 +67,6 @@ def open_obstacles(files: SceneFiles, area: BaseGeometry, ways: Sequence[Route])
 
 
 def polygon_of(box: Box) -> shapely.Polygon:
-    """A box as a polygon."""
     along = 0.5 * box.length_m * np.array([np.cos(box.heading_rad), np.sin(box.heading_rad)])
     across = 0.5 * box.width_m * np.array([-np.sin(box.heading_rad), np.cos(box.heading_rad)])
     centre = np.array([box.x_m, box.y_m])
@@ -187,7 +187,6 @@ class LaneStrip:
 
     @cached_property
     def area(self) -> BaseGeometry:
-        """The strip as a shape."""
         return shapely.LineString(self.line).buffer(0.5 * _CAR_M, cap_style="flat")
 
 
@@ -220,9 +219,8 @@ def blockages(strips: Sequence[LaneStrip], poses: FloatArray, obstacles: Obstacl
             shared = strip.area.intersection(box)
             if shared.area > 0.0:
                 line = shapely.LineString(strip.line)
-                places = [line.project(shapely.Point(point)) for point in shapely.get_coordinates(shared)]
                 scale = strip.length_m / line.length
-                front_m, back_m = scale * max(places), scale * min(places)
+                back_m, front_m = (scale * each for each in extent_of(line, shared))
                 length_m = max(front_m - back_m, _LEAST_M)
                 found.append(Blockage(obstacle=k, strip=strip, front_m=max(front_m, length_m), length_m=length_m))
     return tuple(found)
