@@ -76,7 +76,6 @@ class Player(Document):
 
     @property
     def on_foot(self) -> bool:
-        """Whether it walks."""
         return self.kind == "pedestrian"
 
     @property
@@ -222,7 +221,6 @@ class Scene(Document):
         return tuple(f"{role} on foot" if player.on_foot else player.vehicle for role, player in pairs)
 
     def player(self, role: str) -> Player:
-        """The player of a name."""
         return self.players[self.roles.index(role)]
 
     @property

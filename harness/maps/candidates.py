@@ -62,7 +62,6 @@ class LaneWay:
 
     @classmethod
     def of(cls, link: Connection) -> LaneWay:
-        """The way of a connection."""
         return cls(start=link.getFromLane(), end=link.getToLane())
 
     @property

@@ -46,12 +46,10 @@ class _Stretch:
 
     @cached_property
     def shape(self) -> shapely.LineString:
-        """The middle of the lane."""
         return shapely.LineString(self.line)
 
     @cached_property
     def shape_m(self) -> float:
-        """The length of the middle of the lane."""
         return float(self.shape.length)
 
 
@@ -64,7 +62,6 @@ class RoadBehind:
 
     @cached_property
     def _shapes(self) -> NDArray[np.object_]:
-        """The middles of the lanes."""
         return np.array([lane.shape for lane in self.lanes.values()])
 
     def follower(self, start: InitialState, length_m: float) -> Departure | None:

@@ -59,7 +59,6 @@ class OpenScene:
 
     @property
     def net_file(self) -> Path:
-        """The scene's net."""
         return self.folder / self.document.net
 
     @property
