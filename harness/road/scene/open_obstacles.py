@@ -30,9 +30,7 @@ from harness.game.sight import TALL_WIDTH_M, Hiding
 from harness.game.state import NOTICED_M
 from harness.road.demand.departures import background_departures
 from harness.road.demand.route_file import RouteFile, VehicleType
-from harness.road.net import network
-from harness.road.net.right_of_way_table import extent_of
-from harness.road.net.surface import length_of
+from harness.road.net import network, right_of_way_table, surface
 from harness.road.scene.scene_files import SceneFiles
 
 _BENT_M = 0.5  # a closed lane is straight: its lane may leave the middle of the box by this much
@@ -110,7 +108,7 @@ def _on_lane(file: Path, name: str, document: written.Obstacle, *, lane: Lane, l
         remedy = f"keep it between {inside_m:g} and {lane.getLength() - inside_m:g} m"
         raise UsageError.of(file, f"{name}.position_m", f"{message} of {lane.getLength():g} m", remedy)
     line = network.lane_line(lane)
-    scale = length_of(line) / lane.getLength()
+    scale = surface.length_of(line) / lane.getLength()
     place = OnLane(
         line=line,
         position_m=document.position_m,
@@ -220,7 +218,7 @@ def blockages(strips: Sequence[LaneStrip], poses: FloatArray, obstacles: Obstacl
             if shared.area > 0.0:
                 line = shapely.LineString(strip.line)
                 scale = strip.length_m / line.length
-                back_m, front_m = (scale * each for each in extent_of(line, shared))
+                back_m, front_m = (scale * each for each in right_of_way_table.extent_of(line, shared))
                 length_m = max(front_m - back_m, _LEAST_M)
                 found.append(Blockage(obstacle=k, strip=strip, front_m=max(front_m, length_m), length_m=length_m))
     return tuple(found)
