@@ -55,7 +55,7 @@ def show_scene(
     from harness.cli.net_views import conflict_table, conflict_words, lane_table
     from harness.maps.candidates import listed_conflicts
     from harness.road.net.net_file import check_net
-    from harness.road.net.net_listing import edges_near, listed_junctions, listed_lane
+    from harness.road.net.net_listing import edges_near, listed
     from harness.road.net.network import read_net
     from harness.road.scene.open_scene import open_scene
 
@@ -65,8 +65,7 @@ def show_scene(
     net_file = scene.net_file if scene is not None else path
     warnings = scene.warnings if scene is not None else check_net(net_file).warnings
     net = read_net(net_file)
-    edges = edges_near(net, net_file, near, within)
-    lanes, junctions = [listed_lane(lane) for edge in edges for lane in edge.getLanes()], listed_junctions(edges)
+    lanes, junctions = listed(edges_near(net, net_file, near, within))
     conflicts = listed_conflicts(net, [junction.name for junction in junctions])
     console = console_of_any_encoding()
     console.print(lane_table(lanes[:rows]), markup=False, highlight=False)

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
 from harness.config.ego_perception import EgoPerception
-from harness.config.scene import Name
+from harness.config.scene import Name, Share
 from harness.config.toml_reading import PATH, TABLE, Document, Mistakes
 from harness.config.training import NaiveTraining, NonEgoTraining, Reconfiguration, Retraining, Training
 from harness.game.perception_errors import PerceptionErrors
@@ -20,7 +20,6 @@ TRAINING_TABLES = ("training", "naive_training", "non_ego_training", "retraining
 
 Seed = Annotated[int, Field(ge=0, lt=2**31)]
 CampaignName = Annotated[str, Field(min_length=1, max_length=40, pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")]
-Share = Annotated[float, Field(ge=0.0, le=1.0)]
 DocumentPath = Annotated[str, Field(min_length=1, max_length=500, pattern=r"^[^\x00-\x1f]*$")]
 PathOrTable = Annotated[
     Annotated[DocumentPath, Tag(PATH)] | Annotated[EgoPerception, Tag(TABLE)],

@@ -4,28 +4,25 @@ from __future__ import annotations
 
 from typing import Any
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from harness.config.campaign import LEARNED, DocumentPath, Ego
-from harness.config.toml_reading import Document
+from harness.config.toml_reading import Excerpt
 
 
-class _NamedByEgo(Document):
-    model_config = ConfigDict(extra="ignore")
+class _NamedByEgo(Excerpt):
     driver: DocumentPath = LEARNED
     persona: DocumentPath = Ego().persona
     perception: DocumentPath | dict[str, Any] | None = None
 
 
-class _NamedByAttribution(Document):
-    model_config = ConfigDict(extra="ignore")
+class _NamedByAttribution(Excerpt):
     baseline: DocumentPath
 
 
-class CampaignNames(Document):
+class CampaignNames(Excerpt):
     """The documents that a campaign names: they are checked even where the rest of it is wrong."""
 
-    model_config = ConfigDict(extra="ignore")
     scene: DocumentPath
     roads: list[DocumentPath] = Field([])
     personas: list[DocumentPath]

@@ -8,11 +8,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias, get_args
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from harness.config.campaign import DocumentPath
 from harness.config.rule_driver import Rules
-from harness.config.toml_reading import Document, nearest, one_of, read_document
+from harness.config.toml_reading import Document, Excerpt, nearest, one_of, read_document
 from harness.config.tunable import Adjustable, ParameterName
 from harness.errors import UsageError
 from harness.game.observation_layout import LAYOUT
@@ -184,8 +184,7 @@ KINDS: dict[str, type[Document]] = {
 }
 
 
-class _Kind(Document):
-    model_config = ConfigDict(extra="ignore")
+class _Kind(Excerpt):
     kind: str
 
 

@@ -80,7 +80,6 @@ def write_schemas(folder: Path, document: str | None = None) -> list[Path]:
 
 
 def file_of(document: str) -> str:
-    """The name of a schema file."""
     return f"{document}.schema.json"
 
 

@@ -100,7 +100,6 @@ class Obstacle(Document):
 
     @property
     def turned_rad(self) -> tuple[float, float]:
-        """`turned_deg` in radians."""
         return radians(self.turned_deg[0]), radians(self.turned_deg[1])
 
 

@@ -60,7 +60,6 @@ class Parametrised(Document):
 
     @property
     def limits(self) -> dict[str, float]:
-        """The limits that are given, by name."""
         return self.model_dump(exclude={"weight"}, exclude_none=True)
 
 
@@ -132,7 +131,6 @@ class FuzzyTerm(Document):
 
     @property
     def function(self) -> FuzzyFunction:
-        """The function of the quantity."""
         sets = []
         for each in self.sets:
             inputs, memberships = zip(*each.points, strict=True)

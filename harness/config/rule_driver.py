@@ -185,7 +185,6 @@ class Rules(Adjustable):
 
     @property
     def searched(self) -> tuple[Tunable, ...]:
-        """The tunable parameters."""
         if self.tunable is not None:
             return self.declared
         if any(getattr(self, name) is not None for name in REACTIONS[1:]):

@@ -12,7 +12,7 @@ from harness.config.toml_reading import Document, Interval, Mistakes, ordered
 from harness.game.roles import MOST_PEOPLE, roles_of
 
 _Lower = Annotated[float, Field(ge=0.0, le=10.0)]
-_Share = Annotated[float, Field(ge=0.0, le=1.0)]
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
 _Upper = Annotated[float, Field(gt=0.0, le=10.0)]
 Visibility = Annotated[float, Field(gt=0.0, le=120.0)]
 Factors = Annotated[tuple[_Lower, _Upper], AfterValidator(ordered)]
@@ -76,7 +76,6 @@ class Player(Document):
 
     @property
     def on_foot(self) -> bool:
-        """Whether it walks."""
         return self.kind == "pedestrian"
 
     @property
@@ -123,7 +122,7 @@ class Varies(Document):
     """Range of the visibility, instead of the scene's `visibility_m`."""
     speed_limit_share: Factors | None = None
     """Range of a factor on all speed limits of the net."""
-    signal_place: Annotated[tuple[_Share, _Share], AfterValidator(ordered)] | None = None
+    signal_place: Annotated[tuple[Share, Share], AfterValidator(ordered)] | None = None
     """Range of the place in the cycles of traffic lights at which the game starts, from 0 to 1. Left out: anywhere."""
 
 
@@ -222,7 +221,6 @@ class Scene(Document):
         return tuple(f"{role} on foot" if player.on_foot else player.vehicle for role, player in pairs)
 
     def player(self, role: str) -> Player:
-        """The player of a name."""
         return self.players[self.roles.index(role)]
 
     @property

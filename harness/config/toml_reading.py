@@ -50,6 +50,12 @@ class Document(BaseModel):
         return "".join(lines) + tomli_w.dumps(self.model_dump(exclude_none=True))
 
 
+class Excerpt(Document):
+    """Some keys of a document; others are ignored."""
+
+    model_config = ConfigDict(extra="ignore")
+
+
 def ordered(interval: tuple[float, float]) -> tuple[float, float]:
     """A range, if its lower end is first."""
     if interval[0] > interval[1]:

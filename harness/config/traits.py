@@ -60,7 +60,7 @@ UNREAD = PersonTraits()
 """No document is read: the plan has no arms that depend on traits."""
 
 
-def traits_of(personas: Iterable[Persona], baseline: Persona | None = None) -> PersonTraits:
+def traits_of(personas: Iterable[Persona], baseline: Persona | None) -> PersonTraits:
     """What a plan knows of personas and of the campaign's baseline, if it has one."""
     personas = list(personas)
     lapsing = tuple(each.name for each in personas if each.attention is not None)

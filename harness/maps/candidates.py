@@ -62,7 +62,6 @@ class LaneWay:
 
     @classmethod
     def of(cls, link: Connection) -> LaneWay:
-        """The way of a connection."""
         return cls(start=link.getFromLane(), end=link.getToLane())
 
     @property
@@ -137,7 +136,7 @@ def foe_pairs(links: Sequence[Connection]) -> Iterator[tuple[Connection, Connect
 
 def candidates(net: Net) -> list[Candidate]:
     """The places where two ways meet on a net, in the order of their numbers."""
-    feeders, rings = Feeders(net), {name for each in net.getRoundabouts() for name in each.getEdges()}
+    feeders, rings = Feeders(net), ring_edges(net)
     nodes = sorted(net.getNodes(), key=lambda node: str(node.getID()))
     crossings = [edge for edge in net.getEdges(withInternal=True) if edge.getFunction() == "crossing"]
     everything = chain(
@@ -156,6 +155,16 @@ def for_cars(links: Iterable[Connection]) -> list[Connection]:
     return [
         link for link in links if is_for_cars(link) and not link.getFrom().isSpecial() and not link.getTo().isSpecial()
     ]
+
+
+def onward(edge: Edge) -> list[Connection]:
+    """The connections from an edge that cars may use."""
+    return for_cars(link for links in edge.getOutgoing().values() for link in links)
+
+
+def ring_edges(net: Net) -> set[str]:
+    """The edges of the roundabouts of a net."""
+    return {name for each in net.getRoundabouts() for name in each.getEdges()}
 
 
 def _at_junction(node: Node, feeders: Feeders, rings: set[str]) -> Iterator[Candidate]:
@@ -200,12 +209,12 @@ def _kind(one: Connection, other: Connection, rings: set[str], arms: int) -> Can
 
 def _lane_ends(edge: Edge) -> Iterator[Candidate]:
     lanes = car_lanes(edge)
-    onward = {lane: for_cars(lane.getOutgoing()) for lane in lanes}
+    leading = {lane: for_cars(lane.getOutgoing()) for lane in lanes}
     for lane in lanes:
-        beside = [each for each in lanes if abs(each.getIndex() - lane.getIndex()) == 1 and onward[each]]
-        if onward[lane] or not beside:
+        beside = [each for each in lanes if abs(each.getIndex() - lane.getIndex()) == 1 and leading[each]]
+        if leading[lane] or not beside:
             continue
-        through = onward[beside[-1]][0]
+        through = leading[beside[-1]][0]
         yield Candidate(
             kind=CandidateKind.LANE_END,
             junction=edge.getToNode().getID(),
@@ -222,8 +231,7 @@ def _zebra(net: Net, crossing: Edge) -> Iterator[Candidate]:
     if "traffic_light" in node.getType() or "rail" in node.getType():
         return
     for edge in node.getIncoming():
-        links = for_cars(link for links in edge.getOutgoing().values() for link in links)
-        link = max(links, key=lambda link: float(_out(link) @ _into(link)), default=None)
+        link = max(onward(edge), key=lambda link: float(_out(link) @ _into(link)), default=None)
         if link is not None and shapely.intersects(shapely.LineString(line), _over(net, link)):
             yield Candidate(
                 kind=CandidateKind.ZEBRA,

@@ -13,7 +13,7 @@ from sumolib.net import Net
 
 from harness.game.arrays import FloatArray
 from harness.game.road import SPACING_M
-from harness.maps.candidates import Candidate, CandidateKind, LaneWay, Priority, candidates, following
+from harness.maps.candidates import Candidate, CandidateKind, LaneWay, Priority, candidates, following, ring_edges
 from harness.maps.planned_routes import PlannedRoute, following_m, planned_route, sampled_to, way_over
 from harness.road.net.route_table import meeting_of_lines
 
@@ -130,8 +130,8 @@ class Plans:
         """`show` gets a line on how far the search is."""
         self.net, self._show = net, show
         self.left_out: dict[str, int] = {}
-        self._routes: dict[tuple[LaneWay, float], PlannedRoute | None] = {}
-        self._rings = {name for each in net.getRoundabouts() for name in each.getEdges()}
+        self._routes: dict[tuple[LaneWay, float], PlannedRoute | str] = {}
+        self._rings = ring_edges(net)
 
     @cached_property
     def all(self) -> list[GamePlan]:
@@ -162,31 +162,28 @@ class Plans:
         if narrow := _narrow(ways):
             return narrow
         ego_route = self._route(candidate.first)
-        if ego_route is None:
-            return "no room for a goal behind it"
-        if ego_route.refusal:
-            return ego_route.refusal
+        if isinstance(ego_route, str):
+            return ego_route
         if candidate.second is None:
             return self._on_foot(candidate, ego_route)
         if candidate.kind is CandidateKind.FOLLOWING:
             return _one_behind_the_other(candidate, ego_route)
         route = self._route(candidate.second)
-        if route is None:
-            return "no room for a goal behind it"
-        if route.refusal:
-            return route.refusal
+        if isinstance(route, str):
+            return route
         if candidate.first.start.getEdge() is candidate.second.start.getEdge():
             return self._from_the_same_edge(candidate, ego_route, route) or "too little road before it"
         for before_m in (None, 80.0, 40.0):  # longer routes may meet before the place
-            routes = [self._route(way, before_m) for way in (candidate.first, candidate.second)]
-            if routes[0] is not None and routes[1] is not None and not (routes[0].refusal or routes[1].refusal):
-                plan = _timed(candidate, ego_route=routes[0], route=routes[1], within_m=_NEAR_M)
+            first, second = (self._route(way, before_m) for way in (candidate.first, candidate.second))
+            if isinstance(first, PlannedRoute) and isinstance(second, PlannedRoute):
+                plan = _timed(candidate, ego_route=first, route=second, within_m=_NEAR_M)
                 if plan is not None:
                     return plan
         return "too little road before it"
 
-    def _route(self, way: LaneWay, before_m: float | None = None) -> PlannedRoute | None:
-        """The route over a way, with so much road before its junction that a game can start at speed."""
+    def _route(self, way: LaneWay, before_m: float | None = None) -> PlannedRoute | str:
+        """The route over a way, with so much road before its junction that a game can start at speed; the reason if
+        there is none."""
         wanted_m = before_m or _BEFORE_S * _SHARES[1] * float(way.start.getSpeed())
         key = (way, wanted_m)
         if key not in self._routes:

@@ -20,8 +20,8 @@ from harness.maps.game_plans import GamePlan, Plans
 from harness.maps.import_map import import_map
 from harness.maps.map_traffic import read_traffic
 from harness.road.demand.route_file import RouteFile
-from harness.road.net.net_listing import ListedJunction, ListedLane, edges_near, listed_junctions, listed_lane
-from harness.road.net.network import car_lanes, junctions_near, lane_line
+from harness.road.net.net_listing import ListedJunction, ListedLane, edges_near, listed
+from harness.road.net.network import car_lanes, junctions_near, lane_line, nodes_of
 from harness.road.net.tiles import Tile, write_tiles
 from harness.road.xml.xml_file import number_of, parse_xml
 
@@ -43,15 +43,17 @@ class OpenMap:
 
     @cached_property
     def reds_s(self) -> dict[str, float]:
-        """The longest red of each traffic light, by its id."""
-        return longest_reds_s(self.net_file)
+        """The longest time for which a link of each traffic light is yellow or red, by the light's id."""
+        reds: dict[str, float] = {}
+        for logic in parse_xml(self.net_file, lambda element: element.tag == "tlLogic"):
+            name = logic.get("id", "")
+            reds[name] = max(reds.get(name, 0.0), _longest_s(logic))
+        return reds
 
     def near(self, edge: str | None, within_m: float) -> list[GamePlan]:
-        """The plans at junctions near an edge, or all. Raises UsageError if there is no such edge."""
-        if edge is None:
-            return list(self.plans)
+        """The plans at junctions near an edge; None: all. Raises UsageError if there is no such edge."""
         edges = edges_near(self.net, self.source, edge, within_m)
-        junctions = {node.getID() for each in edges for node in (each.getFromNode(), each.getToNode())}
+        junctions = {node.getID() for node in nodes_of(edges)}
         return [plan for plan in self.plans if plan.candidate.junction in junctions]
 
     def place_of(self, plan: GamePlan) -> str:
@@ -67,8 +69,7 @@ class OpenMap:
         return [lane_line(lane) for edge in self.net.getEdges(withInternal=False) for lane in car_lanes(edge)]
 
     def listed(self) -> tuple[list[ListedLane], list[ListedJunction]]:
-        edges = self.net.getEdges(withInternal=False)
-        return [listed_lane(lane) for edge in edges for lane in edge.getLanes()], listed_junctions(edges)
+        return listed(self.net.getEdges(withInternal=False))
 
 
 def open_map(
@@ -101,15 +102,6 @@ def open_map(
         whole_net=whole_net,
         traffic=traffic,
     )
-
-
-def longest_reds_s(net_file: Path) -> dict[str, float]:
-    """The longest time for which a link of each traffic light of a checked net is yellow or red, by the light's id."""
-    reds: dict[str, float] = {}
-    for logic in parse_xml(net_file, lambda element: element.tag == "tlLogic"):
-        name = logic.get("id", "")
-        reds[name] = max(reds.get(name, 0.0), _longest_s(logic))
-    return reds
 
 
 def _longest_s(logic: ElementTree.Element) -> float:

@@ -13,13 +13,15 @@ from sumolib.net import Net
 from sumolib.net.connection import Connection
 from sumolib.net.edge import Edge
 from sumolib.net.lane import Lane
+from sumolib.net.node import Node
 
 from harness.game.arrays import FloatArray
 from harness.game.road import SPACING_M
-from harness.maps.candidates import Candidate, LaneWay, for_cars
+from harness.maps.candidates import Candidate, LaneWay, for_cars, onward
 from harness.road.net.lane_route import LaneRoute
 from harness.road.net.network import lane_line
 from harness.road.net.route_table import route_line
+from harness.road.net.surface import stations_of
 
 BEYOND_M = 45.0  # of the goal behind the junction
 _ROOM_M = 8.0  # behind a goal, at the end of the last edge
@@ -33,6 +35,7 @@ _FREE_STATES = "MO"
 _FARTHEST_M = 12.0  # between the end of a crossing and that of a pavement
 _ONTO_M = 1.5  # of the pavement at the end of a way
 _SHARPEST_DEG = 105.0
+_NO_ROOM = "no room for a goal behind it"
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -48,7 +51,6 @@ class PlannedRoute:
     limit_mps: float  # the lowest speed limit of the edges before the junction
     lights: tuple[tuple[float, str], ...]  # station and id of each traffic light up to the goal
     turns_deg: tuple[float, ...]  # at each junction, without sign
-    refusal: str  # the reason against a route on which no game is offered; empty if there is none
 
     @property
     def line(self) -> FloatArray:
@@ -56,9 +58,9 @@ class PlannedRoute:
         return sampled_to(self.points, self.goal_m)
 
 
-def planned_route(net: Net, way: LaneWay, before_m: float, rings: Collection[str]) -> PlannedRoute | None:
-    """A route over a way with at least `before_m` of road before its junction, if there is as much; None if there is
-    no room for a goal behind it. On the way back, straight roads with priority are preferred."""
+def planned_route(net: Net, way: LaneWay, before_m: float, rings: Collection[str]) -> PlannedRoute | str:
+    """A route over a way with at least `before_m` of road before its junction, if there is as much; the reason if no
+    game is offered on it. On the way back, straight roads with priority are preferred."""
     edges = [way.start.getEdge()]
     while sum(edge.getLength() for edge in edges) < before_m and len(edges) < _MOST_EDGES:
         link = _previous(way if len(edges) == 1 else None, edges, rings)
@@ -83,13 +85,13 @@ def following_m(limit_mps: float) -> float:
     return _FOLLOWING_S * limit_mps + _AHEAD_M
 
 
-def _with_goal(net: Net, edges: Sequence[Edge], place: int) -> PlannedRoute | None:
-    """The route along edges whose junction is behind the one in `place`, with its goal."""
+def _with_goal(net: Net, edges: Sequence[Edge], place: int) -> PlannedRoute | str:
+    """The route along edges whose junction is behind the one in `place`, with its goal; the reason if there is none."""
     try:
         points, starts = route_line(net, LaneRoute(edges))
     except ValueError:
-        return None
-    length_m = float(_stations(points)[-1])
+        return _NO_ROOM
+    length_m = float(stations_of(points)[-1])
     ends = [*starts[1::2], length_m]  # of the edges
     has_junction = place + 1 < len(edges)
     begin_m = starts[2 * place + 2] if has_junction else 0.0
@@ -100,10 +102,14 @@ def _with_goal(net: Net, edges: Sequence[Edge], place: int) -> PlannedRoute | No
     last_m = length_m - _ROOM_M
     spots = [(m, k) for m, k in spots if starts[2 * k] + _INTO_M <= m <= last_m and m >= begin_m + _NEAREST_GOAL_M]
     if not spots:
-        return None
+        return _NO_ROOM
     goal_m, k = min(spots, key=lambda spot: abs(spot[0] - wanted_m))
     share = (goal_m - starts[2 * k]) / max(ends[k] - starts[2 * k], 1e-9)
     turns_deg = tuple(_turn_deg(one, other) for one, other in pairwise(edges[: k + 1]))
+    if max(turns_deg, default=0.0) > _SHARPEST_DEG:
+        return f"turns above {_SHARPEST_DEG:.0f} degrees"
+    if not shapely.LineString(sampled_to(points, goal_m)).is_simple:
+        return "loops"
     return PlannedRoute(
         edges=tuple(edge.getID() for edge in edges),
         points=points,
@@ -115,17 +121,10 @@ def _with_goal(net: Net, edges: Sequence[Edge], place: int) -> PlannedRoute | No
         lights=tuple(
             (end_m, name)
             for end_m, edge in zip(ends, edges[:k], strict=False)
-            for name in sorted({link.getTLSID() for link in _onward(edge) if link.getTLSID()})
+            for name in sorted({link.getTLSID() for link in onward(edge) if link.getTLSID()})
         ),
         turns_deg=turns_deg,
-        refusal=_refusal(turns_deg, sampled_to(points, goal_m)),
     )
-
-
-def _refusal(turns_deg: Sequence[float], line: FloatArray) -> str:
-    if max(turns_deg, default=0.0) > _SHARPEST_DEG:
-        return f"turns above {_SHARPEST_DEG:.0f} degrees"
-    return "" if shapely.LineString(line).is_simple else "loops"
 
 
 def _turn_deg(before: Edge, behind: Edge) -> float:
@@ -135,13 +134,9 @@ def _turn_deg(before: Edge, behind: Edge) -> float:
     return abs(float(np.degrees(np.arctan2(x * next_y - y * next_x, x * next_x + y * next_y))))
 
 
-def _stations(points: FloatArray) -> FloatArray:
-    return np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
-
-
 def sampled_to(points: FloatArray, until_m: float) -> FloatArray:
     """[n, 2] points every `SPACING_M` up to a station of the line through `points` [m, 2]."""
-    wanted, stations = np.arange(0.0, until_m + 1e-6, SPACING_M), _stations(points)
+    wanted, stations = np.arange(0.0, until_m + 1e-6, SPACING_M), stations_of(points)
     return np.stack([np.interp(wanted, stations, each) for each in points.T], axis=1)
 
 
@@ -156,7 +151,7 @@ def _previous(way: LaneWay | None, edges: Sequence[Edge], rings: Collection[str]
 
 
 def _next(edges: Sequence[Edge], rings: Collection[str]) -> Edge | None:
-    links = [link for link in _onward(edges[-1]) if link.getTo() not in edges]
+    links = [link for link in onward(edges[-1]) if link.getTo() not in edges]
     best = min(links, key=lambda link: _cost(link, link.getTo(), rings), default=None)
     return best.getTo() if best is not None else None
 
@@ -170,17 +165,14 @@ def _cost(link: Connection, edge: Edge, rings: Collection[str]) -> tuple[float, 
     return cost, edge.getID()
 
 
-def _onward(edge: Edge) -> list[Connection]:
-    return for_cars(link for links in edge.getOutgoing().values() for link in links)
-
-
 def way_over(candidate: Candidate, before_m: float) -> FloatArray | None:
     """[n, 2] a way that comes from the side nearer to the ego's approach, with up to `before_m` of pavement before the
     road; None where a side has no pavement."""
     assert candidate.footway is not None, "only zebra crossings have a footway"
     ego_end = lane_line(candidate.first.start)[-1]
     near, far = sorted(candidate.footway, key=lambda point: float(np.hypot(*(point - ego_end))))
-    lanes = _pavements(candidate.first.start.getEdge(), candidate.first.end.getEdge())
+    nodes = {candidate.first.start.getEdge().getToNode(), candidate.first.end.getEdge().getFromNode()}
+    lanes = _pavements(nodes)
     come, go = _nearest(lanes, near, before_m), _nearest(lanes, far, _ONTO_M)
     if come is None or go is None:
         return None
@@ -189,9 +181,8 @@ def way_over(candidate: Candidate, before_m: float) -> FloatArray | None:
     return points[np.concatenate(([True], apart))]
 
 
-def _pavements(*edges: Edge) -> list[Lane]:
-    """The lanes for people on foot alone beside the edges of a junction."""
-    nodes = {edges[0].getToNode(), edges[-1].getFromNode()}
+def _pavements(nodes: Collection[Node]) -> list[Lane]:
+    """The lanes for people on foot alone beside the edges of junctions."""
     around = {edge for node in nodes for edge in (*node.getIncoming(), *node.getOutgoing()) if not edge.isSpecial()}
     lanes = [lane for edge in sorted(around, key=lambda edge: str(edge.getID())) for lane in edge.getLanes()]
     return [lane for lane in lanes if lane.allows("pedestrian") and not lane.allows("passenger")]

@@ -24,10 +24,10 @@ from harness.errors import HarnessError, Problem, UsageError
 from harness.game.arrays import FloatArray
 from harness.replay.pictures import FORMATS, Label, captioned, encode, find_ffmpeg, kept_apart, labels_at
 from harness.replay.scenery import labels_of_contacts
-from harness.replay.sumo_gui import NO_SUMO_GUI, find_sumo_gui, find_xvfb, home_of, screen_problem, virtual_screen
+from harness.replay.sumo_gui import NO_SUMO_GUI, find_sumo_gui, find_xvfb, screen_problem, virtual_screen
 from harness.replay.vehicles import PLAYER_COLOURS, legend
 from harness.road.xml.xml_file import parse_xml
-from harness.sumo.gui import WindowClosed, gui_environment, steered_gui
+from harness.sumo.gui import WindowClosed, steered_gui
 
 SIZE_PX = (960, 480)
 WIDTH_M = 80.0  # of visible road: a car of 4.6 m is 55 pixels long
@@ -126,8 +126,7 @@ def _photographed(
         (work / name).write_text(re.sub(left_out, "", content), encoding="utf-8")
         options += [option, str(work / name)]
     picture, height_m = work / "picture.png", width_m * SIZE_PX[1] / SIZE_PX[0]
-    environment = gui_environment(home_of(program), display)
-    with steered_gui(program, options, environment, patient=False) as window:
+    with steered_gui(program, options, display=display, patient=False) as window:
         try:
             # SUMO's first step only inserts the vehicles, and its first picture has another size
             for step in range(-1, shown[-1] + 1):

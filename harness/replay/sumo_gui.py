@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from harness.errors import HarnessError, Problem, UsageError
-from harness.sumo.gui import WindowClosed, end_process, gui_environment, steered_gui
+from harness.sumo.gui import WindowClosed, end_process, steered_gui
 
 FOLLOWED_M = (80.0, 40.0)  # of road around the ego: a car of 4.6 m is then 73 pixels long
 _EGO = "ego"
@@ -43,7 +43,7 @@ def follow_in_sumo_gui(folder: Path, opened: Callable[[], None]) -> None:
         raise UsageError(problems)
     options = dict(_END.findall(configuration.read_text(encoding="utf-8")))
     steps = round(float(options["end"]) / float(options["step-length"]))
-    with steered_gui(program, ["-c", str(configuration)], gui_environment(home_of(program))) as window:
+    with steered_gui(program, ["-c", str(configuration)]) as window:
         opened()
         try:
             following = False
@@ -75,12 +75,6 @@ def find_sumo_gui() -> Path | None:
             return Path(found)
     found = shutil.which("sumo-gui")
     return Path(found) if found else None
-
-
-def home_of(program: Path) -> Path:
-    """SUMO's folder with its data: the parent of `bin`, or another one in the layout of a Linux distribution."""
-    home = program.resolve().parent.parent
-    return home if (home / "data").is_dir() else Path(os.environ.get("SUMO_HOME", "/usr/share/sumo"))
 
 
 _STARTS_WITHIN_S = 30.0

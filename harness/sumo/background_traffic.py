@@ -56,7 +56,6 @@ class _Table:
         return place
 
     def clear(self, game: int) -> None:
-        """Remove all vehicles of a game."""
         self.count[game] = 0
         self.due[game] = _NEVER
 

@@ -11,7 +11,7 @@ import os
 import subprocess
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +37,7 @@ class WindowClosed(SimulationError):
 class GuiWindow:
     """A running SUMO-GUI that waits for steps. Every method but `release` raises WindowClosed if SUMO-GUI has ended."""
 
-    def __init__(self, connection: Any, process: subprocess.Popen[bytes], patient: bool) -> None:
+    def __init__(self, connection: Any, process: subprocess.Popen[bytes], *, patient: bool) -> None:
         self._connection, self.process = connection, process
         # traci has no option for a timeout; a SUMO-GUI that shows an error dialogue never answers
         connection._socket.settimeout(_ANSWERS_WITHIN_S)
@@ -96,21 +96,22 @@ class GuiWindow:
 
 @contextlib.contextmanager
 def steered_gui(
-    program: Path, options: list[str], environment: Mapping[str, str], patient: bool = True
+    program: Path, options: list[str], *, display: str | None = None, patient: bool = True
 ) -> Iterator[GuiWindow]:
-    """Start SUMO-GUI with options, and end it at the end of the block.
+    """Start SUMO-GUI with options on the screen `display` (None: the user's), and end it at the end of the block.
 
     With `patient`, a step has no time limit, because the user may pause SUMO-GUI. Raises SimulationError, with the
     output of SUMO-GUI, if it can't start.
     """
+    environment = os.environ | {"SUMO_HOME": str(_home_of(program))} | ({"DISPLAY": display} if display else {})
     port = getFreeSocketPort()
     with tempfile.TemporaryDirectory(prefix="harness-gui-") as folder, tempfile.TemporaryFile() as output:
         errors = Path(folder) / "errors"
         command = [str(program), *options, "--remote-port", str(port), "--error-log", str(errors)]
-        process = subprocess.Popen(command, env=dict(environment), stdout=output, stderr=output)
+        process = subprocess.Popen(command, env=environment, stdout=output, stderr=output)
         try:
             try:
-                window = GuiWindow(_connect(port, process), process, patient)
+                window = GuiWindow(_connect(port, process), process, patient=patient)
             except (OSError, WindowClosed) as error:
                 output.seek(0)
                 logged = errors.read_bytes() if errors.is_file() else b""
@@ -119,6 +120,12 @@ def steered_gui(
             yield window
         finally:
             end_process(process)
+
+
+def _home_of(program: Path) -> Path:
+    """SUMO's folder with its data: the parent of `bin`, or another one in the layout of a Linux distribution."""
+    home = program.resolve().parent.parent
+    return home if (home / "data").is_dir() else Path(os.environ.get("SUMO_HOME", "/usr/share/sumo"))
 
 
 def _connect(port: int, process: subprocess.Popen[bytes]) -> Any:
@@ -142,9 +149,3 @@ def end_process(process: subprocess.Popen[bytes]) -> None:
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()
-
-
-def gui_environment(home: Path, display: str | None = None) -> dict[str, str]:
-    """The environment for the SUMO-GUI of the SUMO at `home`, on the screen `display` (None: the user's)."""
-    environment = os.environ | {"SUMO_HOME": str(home)}
-    return environment | ({"DISPLAY": display} if display else {})

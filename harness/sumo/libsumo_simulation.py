@@ -56,11 +56,6 @@ class LibsumoSimulation(Simulation):
     """A SUMO simulation in this process, alone or beside others (`side_by_side`). `close`, or the end of this object
     and those beside it, releases libsumo."""
 
-    @staticmethod
-    def in_use() -> bool:
-        """Whether libsumo is in use in this process, by the harness or by other code."""
-        return libsumo.isLoaded()
-
     @classmethod
     def side_by_side(cls, parts: Sequence[SceneGames], seed: int) -> list[LibsumoSimulation]:
         """Load SUMO with the games of several simulations that can share it (`can_share`). Before one of them is

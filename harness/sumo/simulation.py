@@ -131,8 +131,8 @@ def distance_to_player_m(fronts_m: FloatArray, of_game: IntArray, players: Playe
 class TypeNames(NamedTuple):
     """The names that the vehicle types of a scene have in SUMO."""
 
-    prefix: str = ""
-    own: frozenset[str] = frozenset()
+    prefix: str
+    own: frozenset[str]
     """The ids of the scene's types. Others are SUMO's own, such as `DEFAULT_VEHTYPE`."""
 
     def in_sumo(self, vehicle_type: str) -> str:

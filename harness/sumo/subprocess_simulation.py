@@ -33,9 +33,11 @@ def open_simulations(parts: Sequence[SceneGames], *, seed: int) -> list[Simulati
     before one of them is stepped. A child process gives the same numbers as this one, and needs one message each way
     per call. Raises SimulationError if SUMO can't load a scene.
     """
+    import libsumo
+
     from harness.sumo.libsumo_simulation import LibsumoSimulation
 
-    here = [] if LibsumoSimulation.in_use() else [k for k, part in enumerate(parts) if can_share(parts[0], part)]
+    here = [] if libsumo.isLoaded() else [k for k, part in enumerate(parts) if can_share(parts[0], part)]
     opened: dict[int, Simulation] = {}
     try:
         if here:

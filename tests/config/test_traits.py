@@ -74,7 +74,7 @@ def test_exchange__with_nobody_takes_a_trait_away() -> None:
 
 def test_traits_of__names_who_lapses_and_what_differs() -> None:
     people = [read_document(file, Persona) for file in (SPEEDY, TEXTING, CAREFUL)]
-    without, found = traits_of(people), traits_of(people, people[2])
+    without, found = traits_of(people, None), traits_of(people, people[2])
     assert (without.lapsing, without.baseline, without.differing) == (("texting",), "", {})
     assert (found.lapsing, found.baseline) == (("texting",), "careful")
     assert list(found.differing) == ["speedy", "texting"]

@@ -90,7 +90,7 @@ class Read:
 
     @cached_property
     def rails(self) -> Rails:
-        return network.rails(self.rail_lines, 20.0)
+        return network.rails(self.rail_lines)
 
     @cached_property
     def tables(self) -> list[Route]:

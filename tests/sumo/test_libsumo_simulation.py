@@ -258,14 +258,14 @@ def test_garbage__releases_libsumo(scene: OpenScene) -> None:
     simulation = weakref.ref(local_simulation(scene))
     gc.collect()
     assert simulation() is None
-    assert not LibsumoSimulation.in_use()
+    assert not libsumo.isLoaded()
 
 
 def test_failed_load__is_an_error_and_leaves_libsumo_free(scene: OpenScene) -> None:
     broken = replace(scene, routes=replace(scene.routes, types_xml="<routes><vType/></routes>"))
     with pytest.raises(SimulationError, match="load scene 'small'"):
         local_simulation(broken)
-    assert not LibsumoSimulation.in_use()
+    assert not libsumo.isLoaded()
 
 
 def test_exit__without_close_is_quiet_and_leaves_no_file(scene: OpenScene, tmp_path: Path) -> None:

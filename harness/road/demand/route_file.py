@@ -7,12 +7,11 @@ game's generator: types and routes of distributions, and the times of random flo
 
 from __future__ import annotations
 
-import math
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import ceil
+from math import ceil, inf
 from pathlib import Path
 
 import numpy as np
@@ -61,7 +60,7 @@ class VehicleType:
     length_m: float = 5.0
     width_m: float = 1.8
     max_speed_mps: float = 55.55
-    desired_speed_mps: float = math.inf
+    desired_speed_mps: float = inf
     """The vType's desiredMaxSpeed. SUMO inserts no vehicle that is faster than this times its speed factor."""
     lane_changes: str = ""
     """The vType's laneChangeModel; empty: SUMO's default."""
@@ -162,6 +161,11 @@ class RouteFile:
     warnings: tuple[str, ...] = ()
     """A line for each attribute that SUMO ignores."""
 
+    @property
+    def names(self) -> set[str]:
+        """Those of all vehicles, persons and flows."""
+        return {*self.vehicles, *(flow.departure.name for flow in self.flows)}
+
     def departures(
         self,
         excluded: set[str],
@@ -204,7 +208,7 @@ class RouteFile:
         return [
             variant
             for each in typed
-            for variant in ([_on(each, choice) for choice in each.choices] or [self._routed(each)])
+            for variant in ([_on(each, choice) for choice in each.choices] or [self.routed(each)])
         ]
 
     @cached_property
@@ -226,23 +230,23 @@ class RouteFile:
 
     def _drawn(self, departure: Departure, generator: np.random.Generator, begin_s: float) -> Departure:
         """A departure of a game, with one type and one route, and with times from `begin_s`."""
-        if begin_s:
-            stops = tuple(stop.later(-begin_s) for stop in departure.stops)
-            departure = replace(departure, depart_s=departure.depart_s - begin_s, stops=stops)
         mix = self.mixes.get(departure.vehicle_type)
         if mix is not None:
             departure = replace(departure, vehicle_type=mix.types[_index(mix.shares, generator)])
         if departure.choices:
-            choice = departure.choices[_index([each.share for each in departure.choices], generator)]
-            choice = replace(choice, stops=tuple(stop.later(-begin_s) for stop in choice.stops))
-            departure = _on(departure, choice)
+            place = _index([each.share for each in departure.choices], generator)
+            departure = _on(departure, departure.choices[place])
+        if begin_s:
+            stops = tuple(stop.later(-begin_s) for stop in departure.stops)
+            departure = replace(departure, depart_s=departure.depart_s - begin_s, stops=stops)
         if departure.lateral == "random":
             departure = replace(departure, lateral=f"{generator.uniform(-1.0, 1.0):.3f}{SHARE}")
         if departure.on_foot:
             departure = _placed(departure, generator)
-        return self._routed(departure)
+        return self.routed(departure)
 
-    def _routed(self, departure: Departure) -> Departure:
+    def routed(self, departure: Departure) -> Departure:
+        """A departure with the route that was found for its trip, if it has one."""
         if not departure.trip or departure.edges:
             return departure
         return replace(departure, edges=self.found.get((departure.vehicle_type, departure.trip), ()))

@@ -60,9 +60,7 @@ def with_routes(routes: RouteFile, net_file: Path, net: Net, needed: Iterable[De
 def _settled(departure: Departure, routes: RouteFile, net: Net) -> Departure:
     """A departure with its route, if that does not depend on its type, and with the places of its stops."""
     kind = routes.types.get(departure.vehicle_type, VehicleType(name="")).vehicle_class
-    if departure.trip:
-        edges = routes.found.get((departure.vehicle_type, departure.trip), ())
-        departure = replace(departure, edges=edges)
+    departure = routes.routed(departure)
     if departure.on_foot and departure.edges:
         return with_places_in_metres(departure, net)
     stops = tuple(placed(stop, net, kind) for stop in departure.stops)

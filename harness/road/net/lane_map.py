@@ -46,12 +46,12 @@ def _neighbours(lane: Lane) -> tuple[str | None, str | None]:
     """The lanes to the left and to the right. Where traffic keeps to the left, SUMO counts from the left side."""
     lanes, k = lane.getEdge().getLanes(), lane.getIndex()
     outer, inner = lanes[k - 1] if k else None, lanes[k + 1] if k + 1 < len(lanes) else None
-    sides = [inner, outer] if _is_left(lane, inner or lane) or (outer and not _is_left(lane, outer)) else [outer, inner]
+    sides = [inner, outer] if is_left(lane, inner or lane) or (outer and not is_left(lane, outer)) else [outer, inner]
     left, right = (None if each is None else each.getID() for each in sides)
     return left, right
 
 
-def _is_left(lane: Lane, other: Lane) -> bool:
+def is_left(lane: Lane, other: Lane) -> bool:
     """Whether another lane of the edge begins to the left of a lane."""
     points = lane_line(lane)
     along, across = points[1] - points[0], lane_line(other)[0] - points[0]

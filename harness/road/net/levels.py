@@ -18,8 +18,8 @@ from sumolib.net.lane import Lane
 
 from harness.errors import UsageError
 from harness.game.arrays import BoolArray, FloatArray
-from harness.road.net.network import passes_other_levels
-from harness.road.net.surface import CLEARANCE_M
+from harness.road.net.network import nodes_of, passes_other_levels
+from harness.road.net.surface import CLEARANCE_M, stations_of
 
 _SPACING_M = 4.0  # between points of the players' roads
 _AT_ONE_PLACE_M = 5.0  # our own: points of the players' roads whose distances differ by less are at one place
@@ -31,7 +31,7 @@ def heights_of_players_roads(net: Net, own: Collection[Edge]) -> FloatArray | No
     passes over or under them."""
     if not passes_other_levels(net, own):
         return None
-    nodes = {node for edge in own for node in (edge.getFromNode(), edge.getToNode())}
+    nodes = nodes_of(own)
     inside = [edge for edge in net.getEdges() if edge.isSpecial() and edge.getFromNode() in nodes]
     lanes = [lane for edge in [*own, *inside] for lane in edge.getLanes()]
     return np.concatenate([_points(lane) for lane in lanes])
@@ -56,7 +56,7 @@ def check_one_level(file: Path, own: Sequence[Edge]) -> None:
 def _points(lane: Lane) -> FloatArray:
     """[m, 3] points of a lane at equal distances, with both ends."""
     line = np.array(lane.getShape3D(), dtype=float)
-    along_m = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line[:, :2], axis=0).T))))
+    along_m = stations_of(line)
     places_m = np.linspace(0.0, along_m[-1], int(along_m[-1] / _SPACING_M) + 2)
     return np.stack([np.interp(places_m, along_m, column) for column in line.T], axis=1)
 

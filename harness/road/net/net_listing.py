@@ -13,7 +13,7 @@ from sumolib.net.edge import Edge
 from sumolib.net.lane import SUMO_VEHICLE_CLASSES, Lane
 
 from harness.game.arrays import FloatArray
-from harness.road.net.network import car_lanes, find_edge, lane_line
+from harness.road.net.network import car_lanes, find_edge, lane_line, nodes_of
 from harness.road.net.surface import lane_shape
 
 _SHORT_LIST = 4  # vehicle classes that are named one by one
@@ -62,8 +62,12 @@ def edges_near(net: Net, path: Path, name: str | None, within_m: float) -> list[
     return [edges[k] for k in order if distances_m[k] <= within_m]
 
 
-def listed_lane(lane: Lane) -> ListedLane:
-    """A lane as a record."""
+def listed(edges: Sequence[Edge]) -> tuple[list[ListedLane], list[ListedJunction]]:
+    """The lanes of edges, and the junctions at their ends."""
+    return [_listed_lane(lane) for edge in edges for lane in edge.getLanes()], _listed_junctions(edges)
+
+
+def _listed_lane(lane: Lane) -> ListedLane:
     edge, line = lane.getEdge(), lane_line(lane)
     shape = max(shapely.get_parts(lane_shape(line, lane.getWidth())), key=shapely.area)
     return ListedLane(
@@ -82,8 +86,7 @@ def listed_lane(lane: Lane) -> ListedLane:
     )
 
 
-def listed_junctions(edges: Sequence[Edge]) -> list[ListedJunction]:
-    nodes = dict.fromkeys(node for edge in edges for node in (edge.getFromNode(), edge.getToNode()))
+def _listed_junctions(edges: Sequence[Edge]) -> list[ListedJunction]:
     kept = set(edges)
     return [
         ListedJunction(
@@ -101,7 +104,7 @@ def listed_junctions(edges: Sequence[Edge]) -> list[ListedJunction]:
                 dtype=float,
             ).reshape(-1, 2),
         )
-        for node in nodes
+        for node in nodes_of(edges)
     ]
 
 

@@ -23,6 +23,7 @@ from sumolib.net.node import Node
 from harness.config.toml_reading import nearest
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray
+from harness.game.quantities import REACH_M
 from harness.game.rails import Rails
 from harness.road.net import surface
 from harness.road.net.surface import Part
@@ -83,7 +84,7 @@ def drivable_area(net: Net, own: Collection[Edge] = ()) -> BaseGeometry:
     it is flat: it has the level of `own`, and roads of other levels are cut off beside them. Where two of `own` lie
     over one another, and without `own`, the levels are one area.
     """
-    edges = edges_near(net, own) if own else net.getEdges(withInternal=True)
+    edges = edges_near(net, own)
     level, is_cut = _own_level(net, edges, own)
     area = surface.without_slits(surface.joined([part.shape for part in level if not part.shape.is_empty]))
     followed = [edge for edge in edges if edge in set(own)] if is_cut else edges
@@ -97,7 +98,7 @@ def passes_other_levels(net: Net, own: Collection[Edge]) -> bool:
 
 def _own_level(net: Net, edges: Sequence[Edge], own: Collection[Edge]) -> tuple[list[Part], bool]:
     """The parts of edges on the level of `own`, and whether parts of other levels were cut off."""
-    nodes = {node for edge in own for node in (edge.getFromNode(), edge.getToNode())}
+    nodes = set(nodes_of(own))
     parts = [*_lane_parts(net, edges, set(own), nodes), *_junction_parts(edges, nodes)]
     level = surface.own_level(parts)
     return level, any(part is not kept for part, kept in zip(parts, level, strict=True))
@@ -105,13 +106,20 @@ def _own_level(net: Net, edges: Sequence[Edge], own: Collection[Edge]) -> tuple[
 
 def junctions_near(net: Net, own: Collection[Edge]) -> frozenset[str] | None:
     """The junctions of the edges within `KEPT_M` of the edges `own`; None if they are all junctions of the net."""
-    nodes = {node for edge in edges_near(net, own) for node in (edge.getFromNode(), edge.getToNode())}
-    everything = {node for edge in net.getEdges(withInternal=False) for node in (edge.getFromNode(), edge.getToNode())}
-    return None if nodes >= everything else frozenset(node.getID() for node in nodes)
+    nodes = set(nodes_of(edges_near(net, own)))
+    everything = nodes_of(net.getEdges(withInternal=False))
+    return None if nodes.issuperset(everything) else frozenset(node.getID() for node in nodes)
+
+
+def nodes_of(edges: Iterable[Edge]) -> list[Node]:
+    """The junctions at both ends of edges, each once."""
+    return list(dict.fromkeys(node for edge in edges for node in (edge.getFromNode(), edge.getToNode())))
 
 
 def edges_near(net: Net, own: Collection[Edge]) -> list[Edge]:
-    """The edges within `KEPT_M` of the edges `own`."""
+    """The edges within `KEPT_M` of the edges `own`; without any, all edges."""
+    if not own:
+        return list(net.getEdges())
     lines = {edge: [shapely.LineString(lane_line(lane)) for lane in edge.getLanes()] for edge in net.getEdges()}
     around = shapely.union_all([line for edge in own for line in lines[edge]])
     shapely.prepare(around)
@@ -144,16 +152,14 @@ def _curved_parts(lane: Lane, is_own: bool) -> Iterator[Part]:
                 yield Part(shape=shape, line=np.column_stack((curve, heights_m)), own=is_own)
 
 
-def _junction_parts(edges: Iterable[Edge], own_nodes: Collection[Node]) -> Iterator[Part]:
+def _junction_parts(edges: Sequence[Edge], own_nodes: Collection[Node]) -> Iterator[Part]:
     """The areas of the junctions at edges, without the pavements inside them."""
     pavements: dict[Node, list[BaseGeometry]] = {}
-    nodes: dict[Node, None] = {}  # in the order of the edges
     for edge in edges:
-        nodes |= dict.fromkeys((edge.getFromNode(), edge.getToNode()))
         if edge.getFunction() == "walkingarea" and len(edge.getLane(0).getShape()) > 2:
             shape = shapely.Polygon(lane_line(edge.getLane(0))).buffer(0)
             pavements.setdefault(edge.getFromNode(), []).append(shape)
-    for node in nodes:
+    for node in nodes_of(edges):
         if len(node.getShape()) > 2:
             shape = shapely.Polygon([point[:2] for point in node.getShape()]).buffer(0)
             if node in pavements:
@@ -216,9 +222,8 @@ def connection_lines(net: Net, link: Connection) -> list[FloatArray]:
 def rail_lines(net: Net, area: BaseGeometry, own: Collection[Edge] = ()) -> list[FloatArray]:
     """The rails as polylines [n, 2]: the outline of the net's drivable area, found with the same `own`, without the
     openings where roads leave the scene or the area."""
-    edges = edges_near(net, own) if own else net.getEdges(withInternal=True)
-    kept = set(edges)
-    nodes = {node for edge in edges for node in (edge.getFromNode(), edge.getToNode())}
+    kept = set(edges_near(net, own))
+    nodes = set(nodes_of(kept))
     openings = [
         shapely.LineString(_cross_section(lane, at_end)).buffer(_OPENING_M, cap_style="square")
         for edge in net.getEdges(withInternal=False)
@@ -232,10 +237,10 @@ def rail_lines(net: Net, area: BaseGeometry, own: Collection[Edge] = ()) -> list
     return [np.asarray(line.coords) for line in getattr(merged, "geoms", [merged]) if len(line.coords) > 1]
 
 
-def rails(lines: Sequence[FloatArray], reach_m: float) -> Rails:
-    """Rails of polylines [n, 2]. Look-ups find all segments within `reach_m` of a point."""
+def rails(lines: Sequence[FloatArray]) -> Rails:
+    """Rails of polylines [n, 2]. Look-ups find all segments that a player may notice."""
     segments = [np.stack((line[:-1], line[1:]), axis=1) for line in lines]
-    return Rails.of(np.concatenate(segments) if segments else np.zeros((0, 2, 2)), reach_m)
+    return Rails.of(np.concatenate(segments) if segments else np.zeros((0, 2, 2)), REACH_M + 10.0)
 
 
 def find_edge(net: Net, path: Path, key: str, name: str) -> Edge:
@@ -286,7 +291,7 @@ def _turnarounds_outside(net: Net) -> set[str]:
 def _cross_section(lane: Lane, at_end: bool) -> FloatArray:
     line = lane_line(lane)
     end, inner = (line[-1], line[-2]) if at_end else (line[0], line[1])
-    along = (end - inner) / max(float(np.linalg.norm(end - inner)), 1e-9)
+    along = surface.unit(end - inner)
     across = 0.5 * lane.getWidth() * np.array([-along[1], along[0]])
     return np.stack((end - across, end + across))
 

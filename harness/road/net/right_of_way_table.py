@@ -21,6 +21,7 @@ from harness.road.net.lane_route import LaneRoute
 from harness.road.net.network import lane_line
 from harness.road.net.route_table import JunctionOnRoute, junctions_on_route
 from harness.road.net.stream import Feeders, Stream, carries_traffic
+from harness.road.net.surface import unit
 
 _MERGING_M = 10.0  # length of the zone of a stream that joins the route
 _LEAST_AREA_M2 = 0.5
@@ -128,7 +129,7 @@ def _own_links(junction: JunctionOnRoute) -> list[tuple[Connection, float, float
     """The links of a junction on a route, each with the lateral offsets, right and left, between which a car is on its
     lane: halfway to the next lane of the route."""
     end = lane_line(junction.link.getFromLane())[-2:]
-    along = (end[1] - end[0]) / max(float(np.linalg.norm(end[1] - end[0])), 1e-9)
+    along = unit(end[1] - end[0])
     left = np.array([-along[1], along[0]])
     lanes: dict[Lane, float] = {
         link.getFromLane(): float((lane_line(link.getFromLane())[-1] - end[1]) @ left) for link in junction.links

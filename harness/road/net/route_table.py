@@ -23,6 +23,7 @@ from harness.game.road import MARGIN_M, SPACING_M, Route
 from harness.road.net.lane_route import LaneRoute
 from harness.road.net.network import connection_lines, inner_lanes, lane_line
 from harness.road.net.own_lanes import own_side
+from harness.road.net.surface import length_of
 
 _FAR_SIDE_M = 50.0
 _ON_POINT_M = 0.1
@@ -96,7 +97,9 @@ def route_table(net: Net, area: BaseGeometry, route: LaneRoute, *, goal: Edge, g
     stations, inside, points, headings = _sampled(line)
     piece_at = np.clip(np.searchsorted(starts, stations, side="right") - 1, 0, len(pieces) - 1)
 
-    ends = route.lane_ends([start + _length(piece.line) for start, piece in zip(starts[::2], pieces[::2], strict=True)])
+    ends = route.lane_ends(
+        [start + length_of(piece.line) for start, piece in zip(starts[::2], pieces[::2], strict=True)]
+    )
     most = max(len(piece.lanes) for piece in pieces)
     offsets = np.full((len(stations), most), np.nan)
     lane_ends = np.full((len(stations), most), np.inf)
@@ -122,7 +125,7 @@ def route_table(net: Net, area: BaseGeometry, route: LaneRoute, *, goal: Edge, g
         lane_offset_m=offsets,
         lane_end_m=lane_ends,
         length_m=line.length,
-        goal_m=starts[row] + goal_position_m / goal.getLength() * _length(pieces[row].line),
+        goal_m=starts[row] + goal_position_m / goal.getLength() * length_of(pieces[row].line),
     )
 
 
@@ -186,10 +189,6 @@ def _between(entry: Lane, exit_: Lane) -> FloatArray:
     )
     blend = (share**2 * (3.0 - 2.0 * share))[:, None]
     return first + blend * (second - first)
-
-
-def _length(line: FloatArray) -> float:
-    return float(np.hypot(*np.diff(line, axis=0).T).sum())
 
 
 def _join(lines: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:

@@ -17,6 +17,7 @@ from sumolib.net.lane import Lane
 from harness.game.arrays import FloatArray
 from harness.road.net.network import TURNAROUNDS, inner_lanes, lane_line
 from harness.road.net.route_table import line_over_junction
+from harness.road.net.surface import lane_shape
 
 USERS = ("passenger", "bus", "truck", "motorcycle", "bicycle", "tram")
 _BEYOND_M = 20.0  # a stream goes on for this length behind the junction
@@ -114,8 +115,7 @@ class Stream:
     def swept(self, beyond: bool) -> BaseGeometry:
         """The area that cars on the link need inside the junction and, if wanted, shortly beyond it."""
         if beyond not in self._swept:
-            line, half_m = self.onward if beyond else self.inner, min(CORRIDOR_M, self.width_m) / 2.0
-            self._swept[beyond] = line.buffer(half_m, cap_style="flat", join_style="mitre")
+            self._swept[beyond] = lane_shape(self.onward if beyond else self.inner, min(CORRIDOR_M, self.width_m))
         return self._swept[beyond]
 
     @cached_property

@@ -40,8 +40,8 @@ class Part:
     own: bool  # it belongs to the level that is kept where levels overlap
 
 
-def lane_shape(line: FloatArray, width_m: float) -> BaseGeometry:
-    """The area of a lane by its centre line [n, 2]."""
+def lane_shape(line: FloatArray | shapely.LineString, width_m: float) -> BaseGeometry:
+    """The area of a lane by its centre line, points [n, 2] or a shape."""
     return shapely.LineString(line).buffer(width_m / 2.0, cap_style="flat", join_style="mitre")
 
 
@@ -84,9 +84,8 @@ def _cut(part: Part, own: Sequence[Part]) -> Part:
 
 def _height_m(part: Part, place: shapely.Point) -> float:
     """The height of a part at the point of its line that is nearest to a place."""
-    steps_m = np.hypot(*np.diff(part.line[:, :2], axis=0).T)
     station_m = shapely.line_locate_point(shapely.LineString(part.line[:, :2]), place)
-    return float(np.interp(station_m, np.concatenate(([0.0], np.cumsum(steps_m))), part.line[:, 2]))
+    return float(np.interp(station_m, stations_of(part.line), part.line[:, 2]))
 
 
 # --- cars that follow lanes ------------------------------------------------------------------------------------------
@@ -146,11 +145,25 @@ def curve_between(before: FloatArray, after: FloatArray) -> FloatArray:
     """[9, 2] cubic Bezier curve that continues one segment [2, 2] and joins another one."""
     start, end = before[1], after[0]
     reach = 0.4 * float(np.linalg.norm(end - start))
-    out = start + reach * _unit(before[1] - before[0])
-    into = end - reach * _unit(after[1] - after[0])
+    out = start + reach * unit(before[1] - before[0])
+    into = end - reach * unit(after[1] - after[0])
     t = np.linspace(0.0, 1.0, 9)[:, None]
     return (1 - t) ** 3 * start + 3 * (1 - t) ** 2 * t * out + 3 * (1 - t) * t**2 * into + t**3 * end
 
 
-def _unit(vector: FloatArray) -> FloatArray:
+# --- lines and vectors -----------------------------------------------------------------------------------------------
+
+
+def unit(vector: FloatArray) -> FloatArray:
+    """A vector of length 1 with this direction; 0 if it has none."""
     return vector / max(float(np.linalg.norm(vector)), 1e-9)
+
+
+def length_of(line: FloatArray) -> float:
+    """The length of a line [n, 2]."""
+    return float(np.hypot(*np.diff(line, axis=0).T).sum())
+
+
+def stations_of(line: FloatArray) -> FloatArray:
+    """[n] how far along a line each of its points [n, 2 or 3] is, by x and y."""
+    return np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line[:, :2], axis=0).T))))

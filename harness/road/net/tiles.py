@@ -47,7 +47,6 @@ class Tile:
 
     @property
     def part(self) -> tuple[Path, frozenset[str] | None]:
-        """What is copied."""
         return self.net_file, self.junctions
 
 

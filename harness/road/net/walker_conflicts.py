@@ -25,6 +25,7 @@ from harness.road.net.network import lane_line
 from harness.road.net.right_of_way_table import extent_of
 from harness.road.net.route_table import route_points
 from harness.road.net.stream import CORRIDOR_M, USERS, Feeders, Piece, Stream, carries_traffic, samples_on
+from harness.road.net.surface import lane_shape
 
 WALKERS_STREAM_M = 3.0
 """Width of a way: a walker that is farther beside it is not in its stream."""
@@ -34,7 +35,6 @@ _BEFORE_CROSSING_M = 1.0  # a vehicle waits this far before a way
 _STRIPE_M, _LONG_M = 0.5, 4.0  # of a stripe: along the way, and across it
 _LEAST_M = 1.0  # of the carriageway on a way
 _FOLLOWED_SHARE = 0.5  # of the length of a crossing
-_CORRIDOR_STYLE: dict[str, Any] = {"cap_style": "flat", "join_style": "mitre"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,8 +134,7 @@ def _zones(
     """Where the corridors of two lines overlap."""
     if not shapely.dwithin(own, other, _NEAR_M):  # for large nets: quicker than the areas of corridors
         return
-    needed = own.buffer(0.5 * own_width_m, **_CORRIDOR_STYLE)
-    overlap = needed.intersection(other.buffer(0.5 * other_width_m, **_CORRIDOR_STYLE))
+    overlap = lane_shape(own, own_width_m).intersection(lane_shape(other, other_width_m))
     for part in shapely.get_parts(overlap):
         if part.area > 0.0 and part.intersects(own) and part.intersects(other):
             yield _Zone(*extent_of(own, part), *extent_of(other, part))

@@ -11,6 +11,7 @@ from sumolib.net.lane import Lane
 
 from harness.config.scene import Goal
 from harness.game.arrays import FloatArray
+from harness.road.net.lane_map import is_left
 from harness.road.net.network import car_lanes, drivable_area, lane_line, paved_lanes
 from harness.road.scene.open_scene import OpenScene
 
@@ -39,10 +40,8 @@ def edge_lines(net: Net) -> list[FloatArray]:
 
 def _lines_between(outer: Lane, inner: Lane) -> list[FloatArray]:
     """The lines [n, 2] at the inner side of a lane: SUMO counts an edge's lanes from its outer side."""
-    points, inner_points = lane_line(outer), lane_line(inner)
-    along, across = points[1] - points[0], inner_points[0] - points[0]
-    side = 1.0 if along[0] * across[1] - along[1] * across[0] > 0.0 else -1.0  # left where traffic keeps right
-    line = shapely.LineString(points).offset_curve(side * outer.getWidth() / 2.0, join_style="mitre")
+    side = 1.0 if is_left(outer, inner) else -1.0  # left where traffic keeps right
+    line = shapely.LineString(lane_line(outer)).offset_curve(side * outer.getWidth() / 2.0, join_style="mitre")
     return [np.asarray(part.coords) for part in getattr(line, "geoms", [line]) if len(part.coords) > 1]
 
 

@@ -30,7 +30,6 @@ FOLLOWER_XML = (
 )
 """SUMO's default driver, who keeps the speed limit and stays in its lane; without SUMO's random numbers, which the
 games of an arena share."""
-_CLASS = "passenger"
 _CAR_LENGTH_M, _CAR_WIDTH_M = CAR_SIZE_M
 _ON_LANE_M = 2.0  # an ego that is farther from the middle of every lane is followed by nobody
 _AHEAD_M = 0.5
@@ -47,12 +46,10 @@ class _Stretch:
 
     @cached_property
     def shape(self) -> shapely.LineString:
-        """The middle of the lane."""
         return shapely.LineString(self.line)
 
     @cached_property
     def shape_m(self) -> float:
-        """The length of the middle of the lane."""
         return float(self.shape.length)
 
 
@@ -65,7 +62,6 @@ class RoadBehind:
 
     @cached_property
     def _shapes(self) -> NDArray[np.object_]:
-        """The middles of the lanes."""
         return np.array([lane.shape for lane in self.lanes.values()])
 
     def follower(self, start: InitialState, length_m: float) -> Departure | None:
@@ -125,9 +121,9 @@ def road_behind(files: SceneFiles) -> RoadBehind:
     """The road on which the ego may be followed: that of its route. Where a car may not drive on all of it, none is."""
     net = files.net
     edges = [net.getEdge(name) for name in files.routes.vehicles[files.document.vehicles[EGO]].edges]
-    if not all(edge.allows(_CLASS) for edge in edges):
+    if not all(network.car_lanes(edge) for edge in edges):
         return NO_ROAD
-    lanes = {lane.getID(): _stretch(lane) for edge in edges for lane in edge.getLanes() if lane.allows(_CLASS)}
+    lanes = {lane.getID(): _stretch(lane) for edge in edges for lane in network.car_lanes(edge)}
     for edge, following in pairwise(edges):
         for lane in (each for each in edge.getLanes() if each.getID() in lanes):
             for link in (each for each in lane.getOutgoing() if each.getTo() is following):
@@ -148,7 +144,7 @@ def _stretch(lane: Lane) -> _Stretch:
 def with_follower_type(routes: RouteFile) -> RouteFile:
     """The route file with the vehicle type of the follower, as traces name it. Raises UsageError if a vehicle of the
     file has the follower's name."""
-    if FOLLOWER in {*routes.vehicles, *(flow.departure.name for flow in routes.flows)}:
+    if FOLLOWER in routes.names:
         message = "is the name of the vehicle that follows the ego"
         raise UsageError.of(routes.path, FOLLOWER, message, "rename it, or give followed_share = 0 in scene.toml")
     return replace(routes, types={**routes.types, FOLLOWER_TYPE: VehicleType(name=FOLLOWER_TYPE)})

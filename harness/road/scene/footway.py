@@ -20,7 +20,7 @@ from harness.road.net import surface
 from harness.road.net.network import lane_line
 from harness.road.net.route_table import way_table
 from harness.road.net.stream import USERS
-from harness.road.net.walker_conflicts import WalkersWay, follows_crossing, stripes, ways_of
+from harness.road.net.walker_conflicts import WalkersWay, stripes, ways_of
 from harness.road.scene.open_player import OpenPlayer
 from harness.road.scene.scene_files import SceneFiles
 
@@ -91,16 +91,17 @@ def _pavements(net: Net) -> list[BaseGeometry]:
 
 def open_walker(role: str, files: SceneFiles, ground: Ground | None) -> OpenPlayer:
     """The player of a name (`Scene.roles`) who is on foot. Raises UsageError with every problem found."""
-    document, net, routes = files.document, files.net, files.routes
+    document, routes = files.document, files.routes
     way = np.array(document.player(role).way, dtype=float)
+    player = document.roles.index(role)
     problem = partial(UsageError.of, files.file, f"{role}.way")
-    length_m = float(np.hypot(*np.diff(way, axis=0).T).sum())
+    length_m = surface.length_of(way)
     if not _LEAST_M <= length_m <= _MOST_M:
         message = f"is {length_m:.1f} m long, {_LEAST_M:g} to {_MOST_M:g} m are possible"
         raise problem(message, "move its points")
     assert ground is not None, "a scene with a way has a ground"
-    line = shapely.LineString(way)
-    outside = line.difference(ground.surface.buffer(-_ROOM_M, join_style="mitre"))
+    on_way = next(each for each in ground.ways if each.player == player)
+    outside = on_way.line.difference(ground.surface.buffer(-_ROOM_M, join_style="mitre"))
     if not outside.is_empty:
         x_m, y_m = shapely.get_coordinates(outside)[0]
         message = f"leaves the surface for people on foot near [{x_m:.1f}, {y_m:.1f}]"
@@ -108,12 +109,12 @@ def open_walker(role: str, files: SceneFiles, ground: Ground | None) -> OpenPlay
     if shapely.intersects(ground.carriageway, shapely.Point(way[-1])):
         message = f"ends on the carriageway, at [{way[-1][0]:.1f}, {way[-1][1]:.1f}]"
         raise problem(message, "end it on a pavement")
-    junction = _junction_crossed(net, line, marked=follows_crossing(net, line))
+    junction = _junction_crossed(files.net, on_way)
     if junction is not None:
         message = f"crosses the road inside junction {junction!r}, where priority and signals on foot are not known"
         remedy = "let it cross the lanes before or behind the junction, or on a crossing of the net without signals"
         raise problem(message, remedy)
-    vehicle = routes.vehicles[document.vehicles[document.roles.index(role)]]
+    vehicle = routes.vehicles[document.vehicles[player]]
     return OpenPlayer(
         route=way_table(way, ground.surface),
         edges=vehicle.edges,
@@ -121,16 +122,16 @@ def open_walker(role: str, files: SceneFiles, ground: Ground | None) -> OpenPlay
     )
 
 
-def _junction_crossed(net: Net, way: shapely.LineString, *, marked: bool) -> str | None:
+def _junction_crossed(net: Net, way: WalkersWay) -> str | None:
     """The first junction inside which a way crosses a lane of traffic; None if there is none. A marked crossing may lie
     in a junction without signals: the walker has priority there, whichever way a vehicle goes."""
     for edge in net.getEdges(withInternal=True):
         has_signals = any(link.getTLSID() for link in edge.getFromNode().getConnections())
-        if edge.getFunction() != "internal" or (marked and not has_signals):
+        if edge.getFunction() != "internal" or (way.marked and not has_signals):
             continue
         for lane in edge.getLanes():
             line = lane_line(lane)
             is_road = any(lane.allows(user) for user in USERS) and np.ptp(line, axis=0).any()
-            if is_road and way.intersects(shapely.LineString(line)):
+            if is_road and way.line.intersects(shapely.LineString(line)):
                 return str(edge.getFromNode().getID())
     return None

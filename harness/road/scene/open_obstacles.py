@@ -30,7 +30,7 @@ from harness.game.sight import TALL_WIDTH_M, Hiding
 from harness.game.state import NOTICED_M
 from harness.road.demand.departures import background_departures
 from harness.road.demand.route_file import RouteFile, VehicleType
-from harness.road.net import network
+from harness.road.net import network, right_of_way_table, surface
 from harness.road.scene.scene_files import SceneFiles
 
 _BENT_M = 0.5  # a closed lane is straight: its lane may leave the middle of the box by this much
@@ -57,8 +57,7 @@ def open_obstacles(files: SceneFiles, area: BaseGeometry, ways: Sequence[Route])
         elif (obstacle := collect(problems, partial(_obstacle, file, name, each, files.net))) is not None:
             found.append(obstacle)
             collect(problems, partial(_check_is_near, file, name, reach_of(obstacle), lines))
-    taken = {each.name for each in found} & {*routes.vehicles, *(flow.departure.name for flow in routes.flows)}
-    for name in sorted(taken):
+    for name in sorted({each.name for each in found} & routes.names):
         problems.append(Problem(str(routes.path), name, "is the name of an obstacle of the scene", "rename it"))
     if problems:
         raise UsageError(problems)
@@ -66,7 +65,6 @@ def open_obstacles(files: SceneFiles, area: BaseGeometry, ways: Sequence[Route])
 
 
 def polygon_of(box: Box) -> shapely.Polygon:
-    """A box as a polygon."""
     along = 0.5 * box.length_m * np.array([np.cos(box.heading_rad), np.sin(box.heading_rad)])
     across = 0.5 * box.width_m * np.array([-np.sin(box.heading_rad), np.cos(box.heading_rad)])
     centre = np.array([box.x_m, box.y_m])
@@ -110,7 +108,7 @@ def _on_lane(file: Path, name: str, document: written.Obstacle, *, lane: Lane, l
         remedy = f"keep it between {inside_m:g} and {lane.getLength() - inside_m:g} m"
         raise UsageError.of(file, f"{name}.position_m", f"{message} of {lane.getLength():g} m", remedy)
     line = network.lane_line(lane)
-    scale = float(np.hypot(*np.diff(line, axis=0).T).sum()) / lane.getLength()
+    scale = surface.length_of(line) / lane.getLength()
     place = OnLane(
         line=line,
         position_m=document.position_m,
@@ -125,7 +123,7 @@ def _on_lane(file: Path, name: str, document: written.Obstacle, *, lane: Lane, l
 
 def _check_straight(file: Path, name: str, place: OnLane, length_m: float) -> None:
     lane = shapely.LineString(place.line)
-    for share in (0.0, 0.5, 1.0):
+    for share in _SHARES:
         x, y, heading = place.pose((share, 0.5, 0.5))
         reach = np.array([0.5 * length_m * np.cos(heading), 0.5 * length_m * np.sin(heading)])
         axis = shapely.LineString(np.array([x, y]) + np.array([-1.0, 1.0])[:, None] * reach)
@@ -187,7 +185,6 @@ class LaneStrip:
 
     @cached_property
     def area(self) -> BaseGeometry:
-        """The strip as a shape."""
         return shapely.LineString(self.line).buffer(0.5 * _CAR_M, cap_style="flat")
 
 
@@ -220,9 +217,8 @@ def blockages(strips: Sequence[LaneStrip], poses: FloatArray, obstacles: Obstacl
             shared = strip.area.intersection(box)
             if shared.area > 0.0:
                 line = shapely.LineString(strip.line)
-                places = [line.project(shapely.Point(point)) for point in shapely.get_coordinates(shared)]
                 scale = strip.length_m / line.length
-                front_m, back_m = scale * max(places), scale * min(places)
+                back_m, front_m = (scale * each for each in right_of_way_table.extent_of(line, shared))
                 length_m = max(front_m - back_m, _LEAST_M)
                 found.append(Blockage(obstacle=k, strip=strip, front_m=max(front_m, length_m), length_m=length_m))
     return tuple(found)

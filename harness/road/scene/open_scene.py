@@ -14,7 +14,7 @@ from harness.game.arrays import FloatArray
 from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import StartDistribution, of_people
 from harness.game.perception_errors import PerceptionErrors
-from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles
+from harness.game.placed_obstacles import Obstacles
 from harness.game.seeding import between
 from harness.game.start_range import StartRange
 from harness.game.world import World
@@ -49,17 +49,16 @@ class OpenScene:
     places: tuple[StartRange, ...]
     edges: tuple[tuple[str, ...], ...]  # each player's route, from its start edge on
     rail_lines: tuple[FloatArray, ...]
-    junctions: frozenset[str] | None = None  # those that games need; None: all of the net
-    obstacles: Obstacles = NO_OBSTACLES
-    lane_strips: tuple[LaneStrip, ...] = ()  # lanes that an obstacle may block
-    road_behind: RoadBehind = NO_ROAD  # on which somebody may follow the ego
-    stripes: tuple[FloatArray, ...] = ()  # [5, 2] each, of the marked crossings
-    roads_m: FloatArray | None = None  # [n, 3] points of the players' roads; None: no other road passes over or under
+    junctions: frozenset[str] | None  # those that games need; None: all of the net
+    obstacles: Obstacles
+    lane_strips: tuple[LaneStrip, ...]  # lanes that an obstacle may block
+    road_behind: RoadBehind  # on which somebody may follow the ego
+    stripes: tuple[FloatArray, ...]  # [5, 2] each, of the marked crossings
+    roads_m: FloatArray | None  # [n, 3] points of the players' roads; None: no other road passes over or under
     perception_errors: PerceptionErrors | None = None  # of the ego in games on this scene; None: it sees what is there
 
     @property
     def net_file(self) -> Path:
-        """The scene's net."""
         return self.folder / self.document.net
 
     @property
@@ -69,8 +68,7 @@ class OpenScene:
     @cached_property
     def has_background_traffic(self) -> bool:
         """Whether vehicles other than the players may depart."""
-        players = set(self.document.vehicles)
-        return bool(self.routes.flows) or bool(set(self.routes.vehicles) - players)
+        return bool(self.routes.names - {*self.document.vehicles})
 
     @cached_property
     def warm_up(self) -> tuple[Snapshot, ...]:

@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from pydantic import ConfigDict
 from sumolib.net import Net
 
 from harness.config.scene import SCENE_FILE, PlainFile, Scene
-from harness.config.toml_reading import Document, nearest, read_document
+from harness.config.toml_reading import Excerpt, nearest, read_document
 from harness.errors import Problem, UsageError, collect
 from harness.files import leads_out
 from harness.road.demand.route_file import RouteFile
@@ -39,10 +38,9 @@ class SceneFiles:
         return self.folder / SCENE_FILE
 
 
-class NamedFiles(Document):
+class NamedFiles(Excerpt):
     """The files that a scene names. They are checked even if the rest of the document is invalid."""
 
-    model_config = ConfigDict(extra="ignore")
     net: PlainFile
     routes: PlainFile
     additional: tuple[PlainFile, ...] = ()

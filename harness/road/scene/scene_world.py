@@ -12,7 +12,6 @@ from sumolib.net.edge import Edge
 from harness.errors import Problem, UsageError, collect
 from harness.game.arrays import FloatArray
 from harness.game.placed_obstacles import Obstacles
-from harness.game.quantities import REACH_M
 from harness.game.road import Road, Routes
 from harness.game.start_range import StartRange
 from harness.game.world import World
@@ -100,9 +99,9 @@ def world_of(
     rules = right_of_way(net, lanes)
     return World(
         road=Road(
-            rails(rail_lines, REACH_M + 10.0),
+            rails(rail_lines),
             Routes.of(routes),
-            None if ground is None else rails(ground.rail_lines, REACH_M + 10.0),
+            None if ground is None else rails(ground.rail_lines),
             None if ground is None else ground.raster,
         ),
         actuators=actuator_limits(document, types),

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from itertools import chain, combinations, takewhile
 from pathlib import Path
 
-import numpy as np
 from sumolib.net.lane import Lane
 
 from harness.errors import UsageError
@@ -18,6 +17,7 @@ from harness.game.start_range import ArrivesAfterEgo, BesideEgo, OnLine, StartRa
 from harness.game.world import World
 from harness.road.net import network
 from harness.road.net.route_table import meeting, route_points
+from harness.road.net.surface import length_of
 from harness.road.scene.scene_files import SceneFiles
 
 _DRAWS = 200
@@ -55,7 +55,7 @@ def _on_lane(role: str, files: SceneFiles, lane: Lane, route: Route) -> StartRan
         remedy = f"keep it between 0 and {lane.getLength():g} m, or give route_m instead of lane"
         raise UsageError.of(file, key, message, remedy)
     line = network.lane_line(lane)
-    scale = float(np.hypot(*np.diff(line, axis=0).T).sum()) / lane.getLength()
+    scale = length_of(line) / lane.getLength()
     if reach[1] * scale >= route.goal_m:
         message = f"{text} and the goal is at {route.goal_m / scale:g} m"
         raise UsageError.of(file, key, message, "start before the goal")
