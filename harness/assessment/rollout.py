@@ -136,7 +136,7 @@ class _Rollout:
         return game
 
     def play_together(self, episodes: Sequence[int]) -> dict[int, Game]:
-        """Play those of the games that can be played side by side. None if one of them ends with an error."""
+        """Play those of the games that can be played side by side. Empty if one of them ends with an error."""
         if self._apart is None or len(episodes) < 2:
             return {}
         starts = {episode: self._start(episode) for episode in episodes}

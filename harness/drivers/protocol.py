@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol, runtime_checkable
+from typing import Protocol, cast, runtime_checkable
 
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.cartesian_view import CartesianView
@@ -38,7 +38,6 @@ class Driver(Protocol):
         ...
 
 
-@runtime_checkable
 class Planner(Driver, Protocol):
     """A driver that gets, beside its observation, the road and what it sees in Cartesian coordinates."""
 
@@ -49,9 +48,9 @@ class Planner(Driver, Protocol):
         """The views [N] for the next decision, which is in games [N]."""
 
 
-def planner_of(driver: Driver) -> Planner | None:
+def planner_of(driver: Driver | None) -> Planner | None:
     """The planner that a driver is, or that it holds as `wrapped`; None if there is none."""
-    within: Driver | None = driver
-    while within is not None and not isinstance(within, Planner):
+    within = driver
+    while within is not None and not hasattr(within, "see"):  # isinstance takes 40 microseconds, in every step
         within = getattr(within, "wrapped", None)
-    return within
+    return cast(Planner | None, within)

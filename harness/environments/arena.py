@@ -116,8 +116,7 @@ class Arena(LiveSimulation):
         """States of the traffic lights as `Reading.signal_texts`; up to date if games are recorded."""
         self.nearby = NearbyBodies(self.world, scene.obstacles, games)
         self.knowledge = Knowledge(scene, games, (self._limits, self.nearby), self._taken_over)
-        drivers_of = [[seat.driver for seat in of_player] for of_player in self.seats]
-        self._views = CartesianViews(scene, drivers_of, (self.nearby, self.simulation), self._taken_over)
+        self._views = CartesianViews(scene, (self.nearby, self.simulation), self._taken_over)
 
     def reset(
         self, starts: Mapping[int, InitialState], departures: Mapping[int, list[Departure]] | None = None

@@ -68,15 +68,11 @@ class CartesianViews:
     def __init__(
         self,
         scene: OpenScene,
-        seats: Sequence[Sequence[Driver | None]],
         around: tuple[NearbyBodies, Simulation],
         taken_over: BoolArray,
     ) -> None:
-        """`seats` [P][n] are the drivers of each player's seats, `taken_over` [P] the players that the harness
-        drives."""
+        """`taken_over` [P] are the players that the harness drives."""
         (self._nearby, self._simulation), self._taken_over = around, taken_over
-        found = [(driver, planner_of(driver)) for of_player in seats for driver in of_player if driver is not None]
-        self._planners = {id(driver): planner for driver, planner in found if planner is not None}
         self._scene, self._memories = scene, dict[tuple[int, int], _Memory]()
 
     def reset(self, games: IntArray) -> None:
@@ -85,15 +81,16 @@ class CartesianViews:
             del self._memories[key]
 
     def plans(self, driver: Driver | None) -> bool:
-        """Whether a driver of the seats is a planner, or holds one."""
-        return id(driver) in self._planners
+        """Whether a driver is a planner now, or holds one."""
+        return planner_of(driver) is not None
 
     def show(
         self, driver: Driver | None, player: int, games: IntArray, there: tuple[Quantities, Seen, Reading | None]
     ) -> None:
         """Show the planner in a driver what its player sees in games [N], by their quantities, what the players take
         the bodies to be, and the reading of all games."""
-        planner, (quantities, known, reading) = self._planners[id(driver)], there
+        planner, (quantities, known, reading) = planner_of(driver), there
+        assert planner is not None, "only planners are shown something"
         sights = _Sights(
             games=games,
             state=quantities.state,

@@ -78,7 +78,7 @@ class PairedRollouts:
 
         Raises the exceptions of the driver and those of `Arena.step`. They have no effect on later calls.
         """
-        self._ego.driver = driver
+        self._ego.wrapped = driver
         played = [self._play(load) for load in range(self._loads)]  # games that only fill the last load are dropped
         payoff, failed = (np.concatenate(each)[: self._games] for each in zip(*played, strict=True))
         return payoff, failed
@@ -100,15 +100,15 @@ class PairedRollouts:
 
 
 class _CurrentDriver:
-    """The driver of the ego's seat: it calls `driver`, which `play` sets."""
+    """The driver of the ego's seat: it calls `wrapped`, which `play` sets."""
 
     takes_over = True
-    driver: Driver
+    wrapped: Driver
 
     def reset(self, games: IntArray) -> None:
         """Reset games [N] of the current driver."""
-        self.driver.reset(games)
+        self.wrapped.reset(games)
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
         """The decisions of the current driver."""
-        return self.driver.decide(games, observation, noise)
+        return self.wrapped.decide(games, observation, noise)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,12 +21,14 @@ from harness.drivers.policy_file import LearnedDriver, read_policy
 from harness.drivers.protocol import Driver
 from harness.errors import StageFailed
 from harness.game.arrays import FloatArray, IntArray
+from harness.game.cartesian_view import CartesianView
 from harness.game.roles import EGO
 from harness.road.scene.open_scene import OpenScene, open_scene
 from harness.training.paired_rollouts import PairedRollouts, seeded_starts
 from harness.training.parameter_search import SearchSpec, Trial, best, propose, read_trials, run_search, write_trials
 from tests.support.external_drivers import document, find
 from tests.support.repository import REPOSITORY
+from tests.support.rollouts import Steady
 from tests.support.shipped import PERSON, POLICIES
 from tests.support.tiny import CAREFUL, PAPER_MERGE, PAPER_SPEEDY
 
@@ -80,6 +83,23 @@ class Recording:
         return self._driver.decide(games, observation, noise)
 
 
+class Watching(Steady):
+    """A planner that keeps its pedals, and counts its views and its decisions."""
+
+    history_s = 0.0
+
+    def __init__(self) -> None:
+        super().__init__(0.1)
+        self.shown = self.decisions = 0
+
+    def see(self, games: IntArray, views: Sequence[CartesianView]) -> None:
+        self.shown += len(views)
+
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        self.decisions += len(games)
+        return super().decide(games, observation, noise)
+
+
 def play(
     scene: OpenScene, driver: Driver, other: Mixture | None = None, alone_share: float = 0.3, **changes: Any
 ) -> Any:
@@ -107,6 +127,13 @@ def test_games__have_the_given_number_and_are_reproducible(scene: OpenScene) -> 
 def test_games__do_not_depend_on_the_number_at_once(scene: OpenScene) -> None:
     alone, together = (play(scene, Recording(scene), at_once=at_once)[0] for at_once in (1, 7))
     np.testing.assert_allclose(alone, together, atol=1e-4)
+
+
+def test_games__show_a_planner_what_it_sees_before_each_decision(scene: OpenScene) -> None:
+    planner = Watching()
+    play(scene, planner)
+    assert planner.decisions > 100
+    assert planner.shown == planner.decisions
 
 
 @pytest.mark.parametrize(("share", "opponents"), [(0.0, range(20, 21)), (1.0, range(1)), (0.5, range(4, 17))])
