@@ -22,9 +22,8 @@ from harness.campaign.plan.planned_drivers import (
     driver_in,
 )
 from harness.campaign.plan.stages import AssessmentStage
-from harness.campaign.storage.manifest import planned
+from harness.campaign.storage.manifest import campaign_in, planned
 from harness.campaign.storage.run_folder import MANIFEST, RunFolder
-from harness.config.campaign import Campaign
 from harness.config.persona import Persona
 from harness.config.toml_reading import nearest
 from harness.drivers.external import find_driver
@@ -57,7 +56,7 @@ class RunPlayers:
         driver = None if ego is None else find_driver(ego, Path("--ego"), "", allow_code)
         folder.check_whole(manifest)
         self._folder, self._ego = folder, driver
-        self.document = document = Campaign.model_validate(manifest["campaign"], strict=False)
+        self.document = document = campaign_in(manifest)
         opened = open_scene(folder.scene, driver.vehicle_type if driver is not None else None)
         self.scene: OpenScene = replace(opened, perception_errors=document.ego.perception_errors)
         self._stages = planned(manifest)

@@ -15,7 +15,7 @@ from jinja2 import Template
 
 from harness.campaign.plan.planned_drivers import Trained
 from harness.campaign.plan.stages import AssessmentStage
-from harness.campaign.storage.manifest import planned
+from harness.campaign.storage.manifest import campaign_in, planned
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign
 from harness.config.persona import Persona
@@ -149,7 +149,7 @@ def _facts(
 def _training_facts(
     entry: Mapping[str, Any], manifest: Mapping[str, Any], policy: Mapping[str, Any]
 ) -> Iterator[tuple[str, str]]:
-    campaign = Campaign.model_validate(manifest["campaign"], strict=False)
+    campaign = campaign_in(manifest)
     against = policy["against"]
     yield "scene", f"`{policy['scene']}`"
     if roads := policy.get("roads"):

@@ -14,7 +14,7 @@ from rich.console import Console
 from harness.campaign.plan.stages import Stage, stage_id
 from harness.campaign.results.shown_work import doing
 from harness.campaign.storage.arm_tables import PLAYED, arm_tables
-from harness.campaign.storage.manifest import planned
+from harness.campaign.storage.manifest import campaign_in, planned
 from harness.campaign.storage.run_folder import JUDGED, SELECTED, TAKEN_OVER, RunFolder
 from harness.config.campaign import Campaign
 from harness.config.toml_reading import Document
@@ -70,7 +70,7 @@ def read_run(folder: RunFolder, console: Console) -> ReadRun:
     are missing or damaged."""
     manifest = folder.manifest()
     folder.check_whole(manifest)
-    campaign = Campaign.model_validate(manifest["campaign"], strict=False)
+    campaign = campaign_in(manifest)
     scene = open_scene(folder.scene)
     for stage in _done(manifest, "assessment"):
         _check_log(folder, stage, manifest["stages"][stage])
