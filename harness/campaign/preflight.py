@@ -31,7 +31,7 @@ from harness.errors import Problem, UsageError, collect
 from harness.game.roles import EGO
 from harness.road.scene.load_check import check_loads
 from harness.road.scene.open_scene import OpenScene, open_scene
-from harness.shipped_documents import PACKAGE, Kind, find_document, is_name, missing_document
+from harness.shipped_documents import PACKAGE, Kind, named_document
 
 QUICK_STEPS = 262_144
 QUICK_SEGMENT_STEPS = 65_536
@@ -115,8 +115,8 @@ def open_campaign(
     if driver not in (LEARNED, SUMO):
         ego_driver = collect(problems, lambda: find_driver(driver, file, "ego.driver", allow_code))
     vehicle_type = ego_driver.vehicle_type if ego_driver is not None else None
-    scene = collect(problems, lambda: open_scene(_find_named(file, "scene", named.scene, "networks"), vehicle_type))
-    roads = [collect(problems, partial(_open_road, file, each)) for each in named.roads]
+    scene = collect(problems, lambda: _open_named(file, "scene", named.scene, vehicle_type))
+    roads = [collect(problems, partial(_open_named, file, "roads", each)) for each in named.roads]
     written = [("ego.persona", named.ego.persona), *(("personas", each) for each in named.personas)]
     if named.attribution is not None:
         written.append(("attribution.baseline", named.attribution.baseline))
@@ -207,17 +207,9 @@ def _is_tunable(driver: ExternalDriver | None) -> bool:
     return driver is not None and bool(driver.searched)
 
 
-def _find_named(file: Path, key: str, written: str, kind: Kind) -> Path:
-    """A document that a campaign names. Raises UsageError if a name is that of no document."""
-    found = find_document(written, file.parent, kind)
-    if is_name(written, kind) and not os.path.exists(found):
-        raise UsageError.of(file, key, *missing_document(written, file.parent, kind))
-    return found
-
-
-def _open_road(file: Path, written: str) -> OpenScene:
-    """A scene on whose road the egos learn too. Raises UsageError if it is missing or wrong."""
-    return open_scene(_find_named(file, "roads", written, "networks"))
+def _open_named(file: Path, key: str, written: str, vehicle_type: str | None = None) -> OpenScene:
+    """A scene that a campaign names. Raises UsageError if it is missing or wrong."""
+    return open_scene(named_document(written, "networks", file, key), vehicle_type)
 
 
 def _game_of(scene: OpenScene) -> tuple[Any, ...]:
@@ -227,7 +219,7 @@ def _game_of(scene: OpenScene) -> tuple[Any, ...]:
 
 def _read_named(file: Path, key: str, written: str, kind: Kind, form: type[D], files: list[Path]) -> D:
     """A document that a campaign names; its file is added to `files`. Raises UsageError if it is missing or wrong."""
-    path = _find_named(file, key, written, kind)
+    path = named_document(written, kind, file, key)
     document = read_document(path, form)
     files.append(path)
     return document

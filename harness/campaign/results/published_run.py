@@ -11,7 +11,7 @@ from harness.campaign.results.drawn_starts import drawn_starts
 from harness.campaign.results.evaluate_run import people_drive, with_acceptance
 from harness.campaign.results.matchups import matchups_of
 from harness.campaign.results.served_report import PAGE
-from harness.campaign.storage.manifest import campaign_in, is_tuned, planned
+from harness.campaign.storage.manifest import campaign_in, done_in, is_tuned, planned
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign
 from harness.evaluation.game_theory.findings import GameFindings, cautions
@@ -86,8 +86,7 @@ def _with_scene(tables: RunTables, campaign: Campaign) -> RunTables:
 
 def _game(folder: RunFolder, campaign: Campaign, tables: RunTables) -> GameFindings | None:
     manifest = tables.manifest
-    done = {name for name, entry in manifest["stages"].items() if entry["status"] == "done"}
-    game = matchups_of(campaign, manifest["personas"], done, is_tuned(manifest))
+    game = matchups_of(campaign, manifest["personas"], done_in(manifest), is_tuned(manifest))
     if game is None:
         return None
     found = {

@@ -172,6 +172,12 @@ def planned(manifest: Mapping[str, Any]) -> list[Stage]:
     return plan(campaign_in(manifest), manifest["personas"], is_tuned(manifest), traits_in(manifest))
 
 
+def done_in(manifest: Mapping[str, Any], kind: str | None = None) -> list[str]:
+    """The stages of a run that are done, by id; those of one kind, if it is given."""
+    entries = manifest["stages"].items()
+    return [name for name, entry in entries if entry["status"] == "done" and kind in (None, entry["kind"])]
+
+
 def traits_in(manifest: Mapping[str, Any]) -> PersonTraits:
     """What the plan of a run knows of the documents of its personas."""
     people = {name: Persona.from_record(each) for name, each in manifest["persona_documents"].items()}

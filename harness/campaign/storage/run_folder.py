@@ -38,6 +38,7 @@ from harness.campaign.storage.manifest import (
     Manifest,
     StageEntry,
     checksum_of_content,
+    done_in,
     read_manifest,
 )
 from harness.campaign.storage.run_log import LOG, run_log
@@ -215,7 +216,7 @@ class RunFolder:
         are not what the stages wrote, and where the manifest is not what the campaign wrote."""
         self.check_unpublished(manifest)
         damaged = [] if manifest.get("sha256") == checksum_of_content(manifest) else [self.manifest_file]
-        for name in (name for name, entry in manifest["stages"].items() if entry["status"] == "done"):
+        for name in done_in(manifest):
             record = self.done(name)
             damaged += [self.work(name) / "done.json"] if record is None else mismatches(record, self.path)
         _refuse([*damaged, *self._changed_scene(manifest)], _RUN)
