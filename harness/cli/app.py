@@ -198,10 +198,10 @@ def _started_on(ray: str | None, jobs: int | None, warn: Callable[[str], None]) 
 
     Raises UsageError where there is no such cluster.
     """
-    from harness.campaign.execution.worker_pool import WorkerPool, cores
+    from harness.campaign.execution.worker_pool import WorkerPool
 
     if ray is None:
-        yield partial(WorkerPool, jobs=jobs or cores())
+        yield partial(WorkerPool, jobs=jobs)
         return
     from harness.campaign.execution.ray_workers import RayWorkers, ray_cluster
 
