@@ -166,12 +166,11 @@ def collect(problems: list[Problem], action: Callable[[], T]) -> T | None:
         return None
 
 
-ALIKE = 0.65
-"""The likeness of two names (`difflib.SequenceMatcher.ratio`) from which one is a misspelling of the other."""
+_ALIKE = 0.65  # the `difflib.SequenceMatcher.ratio` from which a name is a misspelling of another
 _COMPARED_CHARACTERS = 200
 
 
 def name_like(word: str, names: Iterable[str]) -> str | None:
     """The name that a word is a misspelling of; None if it is like none of them."""
-    close = difflib.get_close_matches(word[:_COMPARED_CHARACTERS], sorted(names), n=1, cutoff=ALIKE)
+    close = difflib.get_close_matches(word[:_COMPARED_CHARACTERS], sorted(names), n=1, cutoff=_ALIKE)
     return close[0] if close else None

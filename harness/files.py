@@ -87,7 +87,7 @@ def sync_folder(folder: Path) -> None:
             os.close(descriptor)
 
 
-def check_file(path: Path, most_bytes: int) -> None:
+def check_file(path: Path, most_bytes: float) -> None:
     """Raise OSError, with the reason in its `strerror`, unless this is a plain file of at most `most_bytes` bytes."""
     status = os.stat(path)
     if not stat.S_ISREG(status.st_mode):
@@ -108,19 +108,18 @@ def content_of(path: Path, most_bytes: int) -> bytes:
     return content
 
 
-def digest_of_file(path: Path) -> str:
-    """SHA-256 of a plain file's content, read in blocks. Raises OSError as `content_of` does, and for more than
-    `MOST_HASHED_BYTES`."""
+def digest_of_file(path: Path, most_bytes: float = MOST_HASHED_BYTES) -> str:
+    """SHA-256 of a plain file's content, read in blocks. Raises OSError as `content_of` does."""
     digest = hashlib.sha256()
-    with _plain_file(path, MOST_HASHED_BYTES) as file:
+    with _plain_file(path, most_bytes) as file:
         while block := file.read(_BLOCK_BYTES):
             digest.update(block)
-            if file.tell() > MOST_HASHED_BYTES:  # it grows while it is read
-                raise OSError(errno.EFBIG, _too_large(file.tell(), MOST_HASHED_BYTES), str(path))
+            if file.tell() > most_bytes:  # it grows while it is read
+                raise OSError(errno.EFBIG, _too_large(file.tell(), most_bytes), str(path))
     return digest.hexdigest()
 
 
-def _plain_file(path: Path, most_bytes: int) -> IO[bytes]:
+def _plain_file(path: Path, most_bytes: float) -> IO[bytes]:
     check_file(path, most_bytes)
     # the path may have been replaced since: opening a pipe without a writer must not block
     descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
@@ -157,5 +156,5 @@ def links_in(folder: str | Path) -> Iterator[Path]:
             yield from links_in(entry.path)
 
 
-def _too_large(size_bytes: int, most_bytes: int) -> str:
+def _too_large(size_bytes: int, most_bytes: float) -> str:
     return f"is too large: {size_bytes / 1e6:,.0f} MB, at most {most_bytes / 1e6:,.0f} MB are read"

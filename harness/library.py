@@ -147,13 +147,13 @@ def run(
     from rich.console import Console
 
     from harness.campaign.execution.run_campaign import run_campaign
-    from harness.campaign.execution.worker_pool import WorkerPool, cores
+    from harness.campaign.execution.worker_pool import WorkerPool
     from harness.campaign.preflight import open_campaign
 
     opened = open_campaign(document_at(Path(campaign), "campaigns"), quick, allow_code)
     folder = RunFolder(Path(out) if out is not None else Path("reports") / opened.run_name)
     console = Console(file=None if progress else io.StringIO())
-    run_campaign(opened, folder, partial(WorkerPool, jobs=jobs or cores()), console, keep_going=keep_going)
+    run_campaign(opened, folder, partial(WorkerPool, jobs=jobs), console, keep_going=keep_going)
     return load(folder.path)
 
 

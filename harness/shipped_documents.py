@@ -72,14 +72,16 @@ def find_document(written: str, folder: Path, kind: Kind) -> Path:
     return beside
 
 
-def named_document(written: str, kind: Kind) -> Path:
-    """The absolute path of a document that Python code names, by a path or a name; of a path, it may not exist.
+def named_document(written: str, kind: Kind, file: Path | None = None, key: str = "") -> Path:
+    """The absolute path of a document that Python code, or a file under a key, names by a path or a name; of a path, it
+    may not exist.
 
     Raises UsageError if it is a name of no document.
     """
-    found = find_document(written, Path(), kind)
+    folder = Path() if file is None else file.parent
+    found = find_document(written, folder, kind)
     if is_name(written, kind) and not os.path.exists(found):
-        raise UsageError.of(written, "", *missing_document(written, Path(), kind))
+        raise UsageError.of(file or written, key, *missing_document(written, folder, kind))
     return found
 
 

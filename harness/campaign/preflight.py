@@ -22,7 +22,7 @@ from harness.config.campaign import LEARNED, SUMO, Campaign
 from harness.config.campaign_names import CampaignNames
 from harness.config.ego_perception import EgoPerception
 from harness.config.persona import Persona
-from harness.config.toml_reading import read_document
+from harness.config.toml_reading import D, read_document
 from harness.config.traits import traits_of
 from harness.drivers import driver_files, policy_origin
 from harness.drivers.car import car_of
@@ -31,7 +31,7 @@ from harness.errors import Problem, UsageError, collect
 from harness.game.roles import EGO
 from harness.road.scene.load_check import check_loads
 from harness.road.scene.open_scene import OpenScene, open_scene
-from harness.shipped_documents import PACKAGE, Kind, find_document, is_name, missing_document
+from harness.shipped_documents import PACKAGE, Kind, named_document
 
 QUICK_STEPS = 262_144
 QUICK_SEGMENT_STEPS = 65_536
@@ -115,16 +115,21 @@ def open_campaign(
     if driver not in (LEARNED, SUMO):
         ego_driver = collect(problems, lambda: find_driver(driver, file, "ego.driver", allow_code))
     vehicle_type = ego_driver.vehicle_type if ego_driver is not None else None
-    scene = collect(problems, lambda: open_scene(_find_named(file, "scene", named.scene, "networks"), vehicle_type))
-    roads = [collect(problems, partial(_open_road, file, each)) for each in named.roads]
+    scene = collect(problems, lambda: _open_named(file, "scene", named.scene, vehicle_type))
+    roads = [collect(problems, partial(_open_named, file, "roads", each)) for each in named.roads]
     written = [("ego.persona", named.ego.persona), *(("personas", each) for each in named.personas)]
     if named.attribution is not None:
         written.append(("attribution.baseline", named.attribution.baseline))
-    persona_files: list[Path] = []
-    found = [collect(problems, partial(_read_persona, file, key, name, persona_files)) for key, name in written]
+    named_files: list[Path] = []
+    found = [
+        collect(problems, partial(_read_named, file, key, name, "personas", Persona, named_files))
+        for key, name in written
+    ]
     ego_persona, *personas = found
-    if isinstance(written_perception := named.ego.perception, str):
-        perception = collect(problems, lambda: _read_perception(file, written_perception, persona_files))
+    if isinstance(errors := named.ego.perception, str):
+        perception = collect(
+            problems, lambda: _read_named(file, "ego.perception", errors, "perception", EgoPerception, named_files)
+        )
         if document is not None and perception is not None:
             document = document.model_copy(update={"ego": document.ego.model_copy(update={"perception": perception})})
     baseline = personas.pop() if named.attribution is not None else None
@@ -168,7 +173,7 @@ def open_campaign(
             elsewhere=elsewhere,
         )
     scene_files = (each.folder / name for each in (scene, *opened) for name in each.document.files)
-    files = [file, *files, *persona_files, *scene_files]
+    files = [file, *files, *named_files, *scene_files]
     for external in (ego_driver, *other_egos.values()):
         files += map(Path, external.files if external is not None else ())
     quick = quick and (policies is None or tunable)
@@ -202,17 +207,9 @@ def _is_tunable(driver: ExternalDriver | None) -> bool:
     return driver is not None and bool(driver.searched)
 
 
-def _find_named(file: Path, key: str, written: str, kind: Kind) -> Path:
-    """A document that a campaign names. Raises UsageError if a name is that of no document."""
-    found = find_document(written, file.parent, kind)
-    if is_name(written, kind) and not os.path.exists(found):
-        raise UsageError.of(file, key, *missing_document(written, file.parent, kind))
-    return found
-
-
-def _open_road(file: Path, written: str) -> OpenScene:
-    """A scene on whose road the egos learn too. Raises UsageError if it is missing or wrong."""
-    return open_scene(_find_named(file, "roads", written, "networks"))
+def _open_named(file: Path, key: str, written: str, vehicle_type: str | None = None) -> OpenScene:
+    """A scene that a campaign names. Raises UsageError if it is missing or wrong."""
+    return open_scene(named_document(written, "networks", file, key), vehicle_type)
 
 
 def _game_of(scene: OpenScene) -> tuple[Any, ...]:
@@ -220,20 +217,12 @@ def _game_of(scene: OpenScene) -> tuple[Any, ...]:
     return scene.world.roles, scene.world.walks.tolist(), scene.world.step_s
 
 
-def _read_persona(file: Path, key: str, written: str, files: list[Path]) -> Persona:
-    """A persona that a campaign names; its file is added to `files`. Raises UsageError if it is missing or wrong."""
-    path = _find_named(file, key, written, "personas")
-    persona = read_document(path, Persona)
+def _read_named(file: Path, key: str, written: str, kind: Kind, form: type[D], files: list[Path]) -> D:
+    """A document that a campaign names; its file is added to `files`. Raises UsageError if it is missing or wrong."""
+    path = named_document(written, kind, file, key)
+    document = read_document(path, form)
     files.append(path)
-    return persona
-
-
-def _read_perception(file: Path, written: str, files: list[Path]) -> EgoPerception:
-    """The perception errors that a campaign names; their file is added to `files`. Raises UsageError as above."""
-    path = _find_named(file, "ego.perception", written, "perception")
-    found = read_document(path, EgoPerception)
-    files.append(path)
-    return found
+    return document
 
 
 def _relative(campaign_file: Path, path: Path) -> str:
@@ -269,10 +258,14 @@ def _ignored_tables(file: Path, document: Campaign, ego_driver: ExternalDriver |
     """A problem for each table and key about another kind of ego than the campaign's."""
     if ego_driver is None and document.ego.driver not in (LEARNED, SUMO):
         return  # the ego's kind is not known
-    if document.ego.shield is not None and ego_driver is not None and ego_driver.vehicle_type is not None:
-        message = f"SUMO drives the ego {document.ego.driver!r}, so that there is no decision to check"
-        yield Problem(str(file), "ego.shield", message, "leave out this key, or name another ego.driver")
-    yield from _known_by_sumo(file, document, ego_driver)
+    if ego_driver is not None and ego_driver.vehicle_type is not None:
+        by_sumo = f"SUMO drives the ego {document.ego.driver!r}"
+        remedy = "leave out this key, or name another ego.driver"
+        if document.ego.shield is not None:
+            yield Problem(str(file), "ego.shield", f"{by_sumo}, so that there is no decision to check", remedy)
+        if document.ego.perception is not None:
+            message = f"{by_sumo}, and its driver models know what is there"
+            yield Problem(str(file), "ego.perception", message, remedy)
     learned = document.ego.driver == LEARNED
     reasons = {}
     if not _is_tunable(ego_driver):
@@ -283,12 +276,6 @@ def _ignored_tables(file: Path, document: Campaign, ego_driver: ExternalDriver |
         if name in document.model_fields_set:
             message = f"this ego {reason}: the table would be ignored"
             yield Problem(str(file), name, message, "leave out this table, or name another ego")
-
-
-def _known_by_sumo(file: Path, document: Campaign, ego_driver: ExternalDriver | None) -> Iterator[Problem]:
-    if document.ego.perception is not None and ego_driver is not None and ego_driver.vehicle_type is not None:
-        message = f"SUMO drives the ego {document.ego.driver!r}, and its driver models know what is there"
-        yield Problem(str(file), "ego.perception", message, "leave out this key, or name another ego.driver")
 
 
 def _find_other_egos(

@@ -6,7 +6,7 @@ import json
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from errno import EACCES, EDQUOT, EFBIG, EIO, EMFILE, ENOMEM, ENOSPC, EPERM, EROFS
+from errno import EACCES, EMFILE, ENOMEM, EPERM
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
@@ -39,6 +39,7 @@ from harness.errors import (
     HarnessError,
     UsageError,
     address_space_bytes,
+    is_of_disk,
     is_of_memory,
     of_system,
     short_of_memory,
@@ -52,8 +53,9 @@ if TYPE_CHECKING:
     from harness.campaign.execution.run_stages import StartWorkers
     from harness.campaign.results.kept_results import RunResult
 
-MACHINE_ERRORS = (ENOSPC, EDQUOT, EACCES, EPERM, EROFS, EMFILE, ENOMEM, EFBIG, EIO)
-"""Errors of the operating system that are no mistakes of the program: they are reported without a traceback."""
+_REFUSALS = (EACCES, EPERM, EMFILE, ENOMEM)
+"""Errors of the operating system that are no mistakes of the program, as those of the disk: they are reported without a
+traceback."""
 _ADDRESS_SPACE_BYTES = 2.5e9  # libraries reserve 2.0 GB, and abort or hang where they get less
 
 app = typer.Typer(
@@ -196,10 +198,10 @@ def _started_on(ray: str | None, jobs: int | None, warn: Callable[[str], None]) 
 
     Raises UsageError where there is no such cluster.
     """
-    from harness.campaign.execution.worker_pool import WorkerPool, cores
+    from harness.campaign.execution.worker_pool import WorkerPool
 
     if ray is None:
-        yield partial(WorkerPool, jobs=jobs or cores())
+        yield partial(WorkerPool, jobs=jobs)
         return
     from harness.campaign.execution.ray_workers import RayWorkers, ray_cluster
 
@@ -263,6 +265,6 @@ def run() -> None:
             _fail(str(without_learners(f"harness {' '.join(sys.argv[1:])}")), USAGE_ERROR)
         if is_of_memory(error):
             _fail(f"{short_of_memory(error)}; finished work is kept", FAILED)
-        if not isinstance(error, OSError) or error.errno not in MACHINE_ERRORS:
+        if not isinstance(error, OSError) or not (is_of_disk(error) or error.errno in _REFUSALS):
             raise
         _fail(f"{of_system(error)}; finished work is kept", FAILED)

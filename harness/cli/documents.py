@@ -10,12 +10,11 @@ import typer
 from harness.cli import messages
 from harness.cli.output import AllowCode, AsJson, console_of_any_encoding, output, print_json, print_plain
 from harness.cli.scenes import check_scene, folder_of_scene
+from harness.errors import FAILED, UsageError, plain
 from harness.shipped_documents import document_at
 
 if TYPE_CHECKING:
     from rich.console import Console
-
-NOT_CONFORMANT = 1
 
 PersonaFile = Annotated[
     Path, typer.Argument(metavar="FILE", help="The TOML file of the persona, or the name of a shipped one.")
@@ -114,7 +113,6 @@ def _check_campaign(file: Path, allow_code: bool, as_json: bool, console: Consol
     from harness.campaign.plan.persona_remarks import ego_persona_remarks, persona_remarks
     from harness.campaign.preflight import open_campaign
     from harness.config.campaign import LEARNED
-    from harness.errors import plain
 
     opened = open_campaign(file, allow_code=allow_code)
     varying = varying_drivers(opened)
@@ -150,7 +148,6 @@ def schema(
     """Print the JSON Schema of a kind of document, or write one or all schemas. Editors use them to complete and check
     TOML files."""
     from harness.config.json_schema import DOCUMENTS, schema_text, write_schemas
-    from harness.errors import UsageError
 
     if out is not None:
         for written in write_schemas(out, document):
@@ -202,7 +199,7 @@ def check_driver(
     findings = check_named(driver, document_at(scene, "networks"), games, allow_code=allow_code)
     print_plain([*findings.lines(), *pace_lines(findings, driver)], Console())
     if findings.violations:
-        raise typer.Exit(NOT_CONFORMANT)
+        raise typer.Exit(FAILED)
 
 
 @policy_app.command("export")
@@ -224,7 +221,6 @@ def export_policy(
     """
     from harness.drivers.external import find_driver
     from harness.drivers.network_export import KINDS, export_network
-    from harness.errors import UsageError
     from harness.files import write_atomically
 
     document = out.with_suffix(".toml")

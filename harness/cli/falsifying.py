@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from harness.cli.output import AllowCode, AsJson, RunPath, output, print_json, print_plain
+from harness.cli.output import AllowCode, AsJson, RunEgo, RunPath, RunSeed, output, print_json, print_plain
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,11 +23,11 @@ def falsify(
         list[str] | None,
         typer.Argument(metavar="[ARM]...", help="Arms of one ego, one of them with SUMO's driver.  [default: naive's]"),
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="The training seed.  [default: the first of the campaign]")] = None,
+    seed: RunSeed = None,
     games: Annotated[int, typer.Option(min=20, metavar="N", help="Games of each search.")] = 200,
     repeats: Annotated[int, typer.Option(min=2, metavar="N", help="Searches of each kind.")] = 10,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder of the tables.  [default: RUN]")] = None,
-    ego: Annotated[str | None, typer.Option(metavar="DRIVER", help="The campaign's ego, if no policy of it.")] = None,
+    ego: RunEgo = None,
     allow_code: AllowCode = False,
     as_json: AsJson = False,
 ) -> None:

@@ -52,14 +52,14 @@ def league(
     with output(as_json, quiet, verbose) as console:
         with console.status("reading scenes and people"):
             from harness.campaign.execution.run_league import play_league
-            from harness.campaign.execution.worker_pool import WorkerPool, cores
+            from harness.campaign.execution.worker_pool import WorkerPool
             from harness.campaign.league_campaigns import name_of, open_league
             from harness.reports.league_page import league_terminal
 
             folder = out or Path("reports") / f"league-{name_of(ego)}"
             names = [each.strip() for each in scenes.split(",")] if scenes is not None else []
             campaigns = open_league(ego, names, folder, episodes=episodes, shield=shield, allow_code=allow_code)
-        outcome = play_league(name_of(ego), campaigns, folder, partial(WorkerPool, jobs=jobs or cores()), console)
+        outcome = play_league(name_of(ego), campaigns, folder, partial(WorkerPool, jobs=jobs), console)
         console.print(league_terminal(outcome.table))
         print_plain([f"League: {folder / 'league.html'}"], console)
         if as_json:

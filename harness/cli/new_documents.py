@@ -8,7 +8,7 @@ import re
 import shutil
 import sys
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
@@ -64,6 +64,13 @@ def check_name(name: str, kind: Literal["campaign", "persona", "scene"]) -> None
     except ValidationError:
         remedy = f"use letters, digits, {signs}, a letter first, at most 40"
         raise UsageError.of("NAME", name, f"can't be the name of a {kind}", remedy) from None
+
+
+def check_free(paths: Iterable[Path], remedy: str) -> None:
+    """Raise UsageError for each of these paths that exists."""
+    if taken := [path for path in paths if os.path.lexists(path)]:
+        message = "is there already, and nothing is overwritten"
+        raise UsageError(Problem(str(path), "", message, remedy) for path in taken)
 
 
 def rendered(template: str, *, in_xml: bool = False, **values: object) -> str:

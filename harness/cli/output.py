@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="A run folder, such as reports/merge.")]
+RunSeed = Annotated[int | None, typer.Option(help="The training seed.  [default: the first of the campaign]")]
+RunEgo = Annotated[str | None, typer.Option(metavar="DRIVER", help="The campaign's ego, if no policy of it.")]
 AllowCode = Annotated[
     bool,
     typer.Option(

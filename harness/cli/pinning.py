@@ -10,7 +10,7 @@ import typer
 from rich.markup import escape
 
 from harness.cli import messages
-from harness.cli.output import AllowCode, RunPath, print_plain
+from harness.cli.output import AllowCode, RunEgo, RunPath, RunSeed, print_plain
 from harness.errors import FAILED, NOT_ACCEPTED, UsageError, plain
 from harness.game.roles import roles_of
 from harness.shipped_documents import document_at
@@ -31,12 +31,12 @@ def minimise(
     episode: Annotated[
         int | None, typer.Argument(metavar="EPISODE", help="The number of a game the ego failed.")
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="The training seed.  [default: the first of the campaign]")] = None,
+    seed: RunSeed = None,
     all_failures: Annotated[
         bool, typer.Option("--all", help="One game for each kind of failure of each arm, or of ARM.")
     ] = False,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="The folder.  [default: RUN/pinned]")] = None,
-    ego: Annotated[str | None, typer.Option(metavar="DRIVER", help="The campaign's ego, if no policy of it.")] = None,
+    ego: RunEgo = None,
     policies: Annotated[
         Path | None,
         typer.Option(

@@ -13,7 +13,7 @@ from urllib.parse import quote
 import typer
 
 from harness.cli import messages
-from harness.cli.output import AsJson, RunPath, output, print_json, print_plain, say_unchecked
+from harness.cli.output import AsJson, RunPath, RunSeed, output, print_json, print_plain, say_unchecked
 from harness.errors import UsageError, plain
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def replay(
     run: RunPath,
     arm: Annotated[str | None, typer.Argument(metavar="ARM", help="The arm, such as naive_vs_speedy.")] = None,
     episode: Annotated[int | None, typer.Argument(metavar="EPISODE", help="The number of the episode.")] = None,
-    seed: Annotated[int | None, typer.Option(help="The training seed.  [default: the first of the campaign]")] = None,
+    seed: RunSeed = None,
     list_games: Annotated[bool, typer.Option("--list", help="List the recorded games, worst first.")] = False,
     outcome: Annotated[
         str | None,

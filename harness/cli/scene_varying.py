@@ -16,6 +16,7 @@ import tomli_w
 
 from harness.assessment.route_trial import check_routes
 from harness.cli import messages
+from harness.cli.new_documents import check_free
 from harness.config.scene import SCENE_FILE
 from harness.errors import Problem, UsageError
 from harness.files import scratch_beside
@@ -53,13 +54,8 @@ def check_variable(scene: OpenScene, seeds: Sequence[int], out: Path) -> None:
     if packed := [scene.folder / each for each in files if each.lower().endswith(".gz")]:
         message, remedy = "is compressed, and only plain files are varied", "unpack it, and name the plain file"
         raise UsageError(Problem(str(path), "", message, remedy) for path in packed)
-    taken = [path for seed in seeds if os.path.lexists(path := out / name_of_variant(scene, seed))]
-    if taken:
-        message, remedy = (
-            "is there already, and nothing is overwritten",
-            "choose another --seed, or --out another folder",
-        )
-        raise UsageError(Problem(str(path), "", message, remedy) for path in taken)
+    paths = (out / name_of_variant(scene, seed) for seed in seeds)
+    check_free(paths, "choose another --seed, or --out another folder")
 
 
 def write_variant(scene: OpenScene, seed: int, out: Path) -> VariedScene:

@@ -15,9 +15,9 @@ from markupsafe import Markup
 
 from harness.assessment.route_trial import check_routes
 from harness.cli import messages
-from harness.cli.new_documents import check_name, rendered
+from harness.cli.new_documents import check_free, check_name, rendered
 from harness.errors import Problem, UsageError, plain
-from harness.files import make_folder, write_atomically
+from harness.files import make_folder, scratch_beside, write_atomically
 from harness.maps.candidates import CandidateKind
 from harness.maps.game_plans import GamePlan
 from harness.maps.map_traffic import SceneTraffic, scene_traffic
@@ -26,7 +26,6 @@ from harness.road.net.network import KEPT_M
 from harness.road.scene.load_check import check_loads
 from harness.road.scene.open_scene import open_scene
 
-_SCRATCH = ".part"
 _PERSONAS = {  # none that lets go of the wheel, as `texting` does: it leaves every road that bends
     CandidateKind.MERGE: ("speedy", "late_merger"),
     CandidateKind.LANE_END: ("speedy", "late_merger"),
@@ -49,10 +48,8 @@ def check_new(name: str, names: Sequence[str], out: Path) -> None:
     check_name(name, "scene")
     if not out.is_dir():
         raise UsageError.of("--out", str(out), *messages.no_folder(out))
-    taken = [path for each in names for path in files_of(each, out) if os.path.lexists(path)]
-    if taken:
-        message, remedy = "is there already, and nothing is overwritten", "choose another NAME, or --out another folder"
-        raise UsageError(Problem(str(path), "", message, remedy) for path in taken)
+    paths = (path for each in names for path in files_of(each, out))
+    check_free(paths, "choose another NAME, or --out another folder")
 
 
 def files_of(name: str, out: Path) -> tuple[Path, Path]:
@@ -112,7 +109,7 @@ def _put(opened: OpenMap, ready: dict[str, tuple[Path, GamePlan]], out: Path) ->
     """Move complete scenes to their places, each under its name at once, and write their campaigns."""
     for kind in ("networks", "campaigns"):
         make_folder(out / kind)
-    scratch = {name: out / "networks" / f".{name}{_SCRATCH}" for name in ready}
+    scratch = {name: scratch_beside(files_of(name, out)[0]) for name in ready}
     done: list[Path] = []
     try:
         for name, (path, _) in ready.items():

@@ -24,7 +24,7 @@ from safetensors.numpy import save as save_tensors
 from harness.config.persona import Persona
 from harness.config.toml_reading import nearest
 from harness.errors import UsageError
-from harness.files import content_of, write_atomically
+from harness.files import content_of, make_folder, write_atomically
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.observation_layout import LAYOUT
 
@@ -94,7 +94,7 @@ class LearnedDriver:
 
 def write_policy(policy: Policy, folder: Path) -> None:
     """Write a policy's folder. Equal policies give equal bytes."""
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     card_file, tensor_file = policy_files(folder)
     card = {"format": FORMAT, "observation": list(LAYOUT), **policy.card}
     tensors = {name: np.ascontiguousarray(tensor) for name, tensor in policy.tensors.items()}

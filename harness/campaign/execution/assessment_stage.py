@@ -38,7 +38,6 @@ from harness.road.scene.open_scene import OpenScene
 
 HOPELESS_GAMES = 10
 """An arm ends if this many games, its first, can't be played for one reason: the others would not be played either."""
-KEEP_GOING = "--keep-going"
 AT_ONCE = 10
 """Segments that a worker takes at a time, if their games can be played side by side."""
 _TRACES = "traces.parquet"
@@ -183,7 +182,7 @@ def _check_hope(arm: SeatedArm, first: Sequence[Segment]) -> None:
     errors = [str(error) for each in first for error in read_csv(each.file(PLAYED))["error"]][:HOPELESS_GAMES]
     if len(errors) == HOPELESS_GAMES and all(errors) and len(set(map(reason_of, errors))) == 1:
         what = f"{arm.name}: none of its first {HOPELESS_GAMES} games could be played, all for one reason"
-        raise StageFailed(f"{what} ({KEEP_GOING} plays the others too): {errors[0]}")
+        raise StageFailed(f"{what} (--keep-going plays the others too): {errors[0]}")
 
 
 def _play_free(

@@ -11,7 +11,6 @@ from harness.campaign.execution.stage_run import StageRun
 from harness.campaign.plan.stages import ConditioningStage
 from harness.drivers.policy_file import persona_hash, policy_files, write_policy
 from harness.drivers.policy_of_many import as_persona, read_policy_of_many
-from harness.files import make_folder
 from harness.road.scene.open_scene import OpenScene
 
 
@@ -27,7 +26,6 @@ def carry_out_conditioning(
     policy, made = as_persona(of_many, stage.persona), context.folder.policy(stage.id)
     named = {"stage": stage.id, "persona": persona.name, "persona_sha256": persona_hash(persona)}
     of_all = {"learned_in": stage.of.stage, "learned_with": list(of_many.card["personas"])}
-    make_folder(made)
     write_policy(replace(policy, card={**policy.card, **named, **of_all}), made)
     facts: dict[str, Any] = {"learned_in": stage.of.stage}
     if (training := context.folder.done(stage.of.stage)) is not None:  # it is one of this run

@@ -64,7 +64,7 @@ class PinnedGames:
     """Pins failures of one run in a folder."""
 
     def __init__(self, folder: RunFolder, players: RunPlayers, out: Path) -> None:
-        self._players, self._out = players, out
+        self._players, self._out, self._start_seed = players, out, players.document.start_seed
         self._episodes = episodes_of(folder)
         self._causes = causes_in_words(read_csv(folder.result("causes.csv")))
 
@@ -126,7 +126,7 @@ class PinnedGames:
                 },
                 "arm": failure.arm,
                 "seed": failure.seed,
-                "start_seed": self._players.start_seed if self._players.start_seed != failure.seed else None,
+                "start_seed": self._start_seed if self._start_seed != failure.seed else None,
                 "episode": failure.episode,
                 "outcome": str(last.record["ego_outcome"]),
                 "found_with": ego.policy.name if ego.policy is not None else failure.arm.partition("_vs_")[0],
@@ -154,7 +154,7 @@ class PinnedGames:
 
     def _start_of(self, episode: int) -> FloatArray:
         """[2 P] the start that is drawn for an episode."""
-        drawn = draw_initial_state(self._players.scene.usual_starts, *parts_of(self._players.start_seed, episode))
+        drawn = draw_initial_state(self._players.scene.usual_starts, *parts_of(self._start_seed, episode))
         return np.concatenate((drawn.position_m, drawn.speed_mps))
 
     def _write(self, place: str, content: bytes) -> str:

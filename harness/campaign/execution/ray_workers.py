@@ -34,7 +34,7 @@ from harness.files import make_folder, write_atomically
 LOCAL, AUTO = "local", "auto"
 _ANSWER_S = 5.0  # the time that a cluster has to accept a connection; Ray itself waits for minutes
 _OBJECTS_BYTES = 80_000_000  # the smallest object store: stages exchange files, and /dev/shm of a container is small
-_QUIET = {"include_dashboard": False, "log_to_driver": False, "logging_level": "ERROR"}
+_QUIET = {"log_to_driver": False, "logging_level": "ERROR"}
 _START = "start one with: ray start --head --port=6379"
 
 
@@ -58,7 +58,7 @@ def ray_cluster(address: str, jobs: int | None) -> Iterator[Any]:
             options = _local_options(stack, jobs or cores())
         else:
             _check_address(address)
-            options = {"address": address, "log_to_driver": False, "logging_level": "ERROR"}
+            options = {**_QUIET, "address": address}
         stack.callback(ray.shutdown)
         with _handlers_kept():
             try:
@@ -77,6 +77,7 @@ def _local_options(stack: contextlib.ExitStack, jobs: int) -> dict[str, Any]:
     return {
         **_QUIET,
         "address": "local",
+        "include_dashboard": False,
         "num_cpus": jobs,
         "num_gpus": 0,
         "object_store_memory": _OBJECTS_BYTES,

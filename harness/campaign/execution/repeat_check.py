@@ -19,7 +19,6 @@ from harness.campaign.storage.checksums import digest_of
 from harness.campaign.storage.run_folder import RunFolder
 from harness.files import make_folder, write_atomically
 
-CHECKING = "playing a game twice"
 _CODE = ("process", "fmu", "stable_baselines3", "python", "onnx", "torchscript")
 """Kinds of drivers whose code is not the harness's own."""
 

@@ -11,7 +11,6 @@ from rich.console import Console
 
 from harness.campaign.execution.cache_keys import stage_keys
 from harness.campaign.execution.progress import StageProgress, event_line
-from harness.campaign.execution.repeat_check import CHECKING as REPEATING
 from harness.campaign.execution.repeat_check import varying_drivers
 from harness.campaign.execution.run_stages import StartWorkers, run_stages
 from harness.campaign.execution.stage_run import Event, run_context_of
@@ -27,7 +26,6 @@ from harness.errors import LEARNERS, plain, without_learners
 from harness.evaluation.competence import DID_NOT_LEARN
 from harness.reports.provenance import mixed_versions, warn
 
-CHECKING = "checking what is finished"
 NOTHING_TO_DO = "Nothing to do: every stage is finished, and the results are those of this version."
 
 
@@ -46,14 +44,14 @@ def run_campaign(
     """
     folder.claim(campaign.document.name, campaign.quick)
     with folder.held():
-        with console.status(REPEATING):
+        with console.status("playing a game twice"):
             varying = varying_drivers(campaign, folder)
         differences = (*varying.items(), *campaign.learned_elsewhere.items())
         for line in (*campaign.scene.warnings, *(plain(f"{driver}: {words}") for driver, words in differences)):
             console.print(line, style="bold yellow", highlight=False, markup=False)
         stages = campaign.stages
         keys = stage_keys(campaign, stages)
-        with console.status(CHECKING):
+        with console.status("checking what is finished"):
             manifest = _ManifestKeeper(campaign, folder, stages=stages, keys=keys, varying=varying)
             folder.keep_scene(campaign.scene.folder, campaign.scene.document.files)
             finished = [name for name, entry in manifest.content["stages"].items() if entry["status"] in FINISHED]

@@ -22,14 +22,11 @@ from harness.campaign.plan.planned_drivers import (
     driver_in,
 )
 from harness.campaign.plan.stages import AssessmentStage
-from harness.campaign.storage.manifest import planned
+from harness.campaign.storage.manifest import campaign_in, planned
 from harness.campaign.storage.run_folder import MANIFEST, RunFolder
-from harness.config.campaign import Campaign
 from harness.config.persona import Persona
 from harness.config.toml_reading import nearest
-from harness.drivers.car import car_of
 from harness.drivers.external import find_driver
-from harness.drivers.protocol import Driver
 from harness.errors import UsageError
 from harness.evaluation.strategies import ErrorFreeEgo
 from harness.files import has_digest
@@ -41,9 +38,8 @@ from harness.shipped_documents import shipped
 
 @dataclass(frozen=True, kw_only=True)
 class SeatedDriver:
-    """A driver in a seat, with its persona; `policy` is the folder of its policy, None if it has none."""
+    """Who drives in a seat: its persona, and the folder of its policy; None if it has none."""
 
-    driver: Driver
     persona: Persona
     policy: Path | None = None
 
@@ -60,7 +56,7 @@ class RunPlayers:
         driver = None if ego is None else find_driver(ego, Path("--ego"), "", allow_code)
         folder.check_whole(manifest)
         self._folder, self._ego = folder, driver
-        self.document = document = Campaign.model_validate(manifest["campaign"], strict=False)
+        self.document = document = campaign_in(manifest)
         opened = open_scene(folder.scene, driver.vehicle_type if driver is not None else None)
         self.scene: OpenScene = replace(opened, perception_errors=document.ego.perception_errors)
         self._stages = planned(manifest)
@@ -73,11 +69,6 @@ class RunPlayers:
             policies=policies or policies_of_run(folder.path, document.policies, manifest["hashes"]),
         )
         self._players = PlayerFactory(context=context, scene=self.scene)
-
-    @property
-    def start_seed(self) -> int:
-        """The seed of the starts of its games."""
-        return self.document.start_seed
 
     def arms(self) -> list[AssessmentStage]:
         """The arms in which an ego meets people, with a driver each that this run can make again: none that other arms
@@ -98,24 +89,23 @@ class RunPlayers:
 
     def seated(self, stage: AssessmentStage) -> SeatedArm:
         """The players of an arm. Raises UsageError if one can't be made."""
-        self.ego(stage)
+        self.ego(stage)  # with `people`, names what is missing
         self.people(stage, episode=0)
         return self._players.arm(stage)
 
     def ego(self, stage: AssessmentStage) -> SeatedDriver:
-        """The ego of an arm. Raises UsageError if it can't be made."""
+        """The ego of an arm. Raises UsageError if it is neither of this run nor named."""
         persona, planned = self._players.context.ego_persona, self._member(stage, EGO, episode=0)
         if isinstance(planned, External | Reconfigured):
             if self._ego is None or isinstance(planned, Reconfigured) or planned.name:
                 raise UsageError.of(
                     self._folder.path / MANIFEST, stage.name, "its ego is no policy of this run", "name it with --ego"
                 )
-            driver = self._ego.make(car_of(self.scene.world, EGO), persona.decisions == "sampled")
-            return SeatedDriver(driver=driver, persona=persona)
+            return SeatedDriver(persona=persona)
         return self._seated(planned, persona)
 
     def people(self, stage: AssessmentStage, episode: int) -> tuple[SeatedDriver, ...]:
-        """Each person of an arm in one episode. Raises UsageError if a policy can't be read."""
+        """Each person of an arm in one episode. Raises UsageError if the folder of its policy is not found."""
         members = (self._member(stage, player, episode) for player in range(1, len(self.scene.world.roles)))
         return tuple(self._seated(each, self._players.persona(each)) for each in members)
 
@@ -126,13 +116,13 @@ class RunPlayers:
             raise UsageError.of(self._folder.path, planned.stage, message, "it is not found: name it with --policies")
         if isinstance(planned, Trained | TrainedBefore):
             policy = self._players.policy_folder(planned)
-        return SeatedDriver(driver=self._players.driver(planned), persona=persona, policy=policy)
+        return SeatedDriver(persona=persona, policy=policy)
 
     def _member(self, stage: AssessmentStage, player: int, episode: int) -> PlannedMember:
         """Who of a mixture drives as a player in an episode; the driver itself where there is one."""
         planned = driver_in(stage.ego, 0) if player == EGO else driver_in(stage.non_ego, player - 1)
         if isinstance(planned, FixedMixture):
-            return planned.members[member_in_episode(planned.shares, player, self.start_seed, episode)]
+            return planned.members[member_in_episode(planned.shares, player, self.document.start_seed, episode)]
         assert planned is not None
         assert not isinstance(planned, BestOf | EquilibriumMixture | Shielded), "left out of `arms`"
         return planned

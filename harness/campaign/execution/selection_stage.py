@@ -25,7 +25,6 @@ from harness.drivers.policy_file import policy_files, read_policy, write_policy
 from harness.errors import StageFailed
 from harness.evaluation.game_theory.policy_selection import CandidateGames, best_candidate, selection_rows
 from harness.evaluation.tables import table_of, write_csv
-from harness.files import make_folder
 from harness.game.outcome import Outcome
 from harness.game.roles import EGO, ROLES
 from harness.road.scene.open_scene import OpenScene
@@ -43,7 +42,6 @@ def carry_out_selection(stage: SelectionStage, run: StageRun, scene: OpenScene) 
     except ValueError as error:
         raise StageFailed(f"{stage.id}: {error}") from error
     policy = read_policy(players.policy_folder(chosen))
-    make_folder(folder.policy(stage.id))
     selected = replace(policy, card={**policy.card, "stage": stage.id, "selected": chosen.stage})
     write_policy(selected, folder.policy(stage.id))
     labels = {"persona": stage.persona, "seed": stage.seed, "round": stage.round, "role": ROLES[stage.learner]}

@@ -22,7 +22,6 @@ from harness.drivers.policy_of_many import card_of_many
 from harness.drivers.policy_origin import origin_card
 from harness.errors import StageFailed
 from harness.evaluation.tables import table_of, write_csv
-from harness.files import make_folder
 from harness.game.roles import EGO, ROLES
 from harness.road.scene.open_scene import OpenScene
 from harness.training.early_stopping import RULE
@@ -57,7 +56,6 @@ def carry_out_training(stage: TrainingStage, run: StageRun, scene: OpenScene) ->
         "rule": RULE if spec.settings.early_convergence else "",
         "versions": versions,
     }
-    make_folder(folder.policy(stage.id))
     write_policy(result.policy, folder.policy(stage.id))
     curve = pd.DataFrame([asdict(point) for point in result.progress.curve])
     ends = [*[""] * (len(curve) - 1), result.stopped][: len(curve)]  # the reason for the end is in the last row

@@ -111,14 +111,15 @@ class _Worker:
 
 
 class WorkerPool:
-    """Processes of this machine, at most `jobs`, each started when it is needed; see `run_stages.Workers`.
+    """Processes of this machine, at most `jobs` (None: one per core), each started when it is needed; see
+    `run_stages.Workers`.
 
     `work` carries out a task, in a worker.
     """
 
-    def __init__(self, context: RunContext, jobs: int, work: Work = carry_out) -> None:
+    def __init__(self, context: RunContext, jobs: int | None, work: Work = carry_out) -> None:
         self._context, self._work = context, work
-        self.capacity = jobs
+        self.capacity = jobs or cores()
         self._workers: list[_Worker] = []
 
     def submit(self, task: Task, attempt: Attempt) -> None:

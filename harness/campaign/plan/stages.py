@@ -4,6 +4,7 @@ afterwards."""
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from itertools import chain
 from typing import ClassVar, TypeAlias
@@ -269,11 +270,6 @@ class SelectionStage(_Stage):
         return self.strategy.round
 
     @property
-    def answer(self) -> Trained:
-        """The policy of this round's training."""
-        return self.candidates[-1]
-
-    @property
     def drivers(self) -> tuple[PlannedDriver, ...]:
         return (*self.candidates, *self.opponent)
 
@@ -312,6 +308,16 @@ def plays_with_errors(stage: Stage) -> bool:
             return False
         case _:
             return True
+
+
+def arms_of(stages: Iterable[Stage]) -> dict[str, Arm]:
+    """The arms among stages, by name; one of several seeds once."""
+    return {stage.name: stage.arm for stage in stages if isinstance(stage, AssessmentStage)}
+
+
+def strategies_of(stages: Iterable[Stage]) -> dict[str, Strategy]:
+    """The strategies that are trained in stages, by name."""
+    return {stage.name: stage.strategy for stage in stages if isinstance(stage, TrainingStage)}
 
 
 def stage_id(name: str, seed: int) -> str:

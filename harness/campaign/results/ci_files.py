@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from junitparser import TestCase
@@ -55,8 +56,13 @@ def write_ci_files(
         "error_games": result.error_games,
         "versions": manifest["versions"],
     }
-    text = json.dumps(document, indent=1, ensure_ascii=False)
-    write_atomically(folder.path / RESULT, (text + "\n").encode("utf-8", errors="backslashreplace"))
+    write_record(folder.path / RESULT, document)
+
+
+def write_record(file: Path, record: Mapping[str, Any]) -> None:
+    """Write JSON for programs. A number that JSON can't write is a null already."""
+    text = json.dumps(record, indent=1, ensure_ascii=False, allow_nan=False)
+    write_atomically(file, (text + "\n").encode("utf-8", errors="backslashreplace"))
 
 
 def _record(check: Check) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from harness.campaign.plan.stages import AssessmentStage
+from harness.campaign.plan.stages import arms_of
 from harness.campaign.results.read_run import episodes_of
 from harness.campaign.storage.manifest import planned
 from harness.campaign.storage.run_folder import RunFolder
@@ -51,11 +51,7 @@ def compare_runs(folders: Sequence[Path], addresses: Sequence[str]) -> Compariso
                 changes=changes[place],
             )
         )
-    arms = [
-        {each.name: each.arm for each in planned(manifest) if isinstance(each, AssessmentStage)}
-        for manifest in manifests
-    ]
-    found = histories(arms, [failure_rates(each) for each in games])
+    found = histories([arms_of(planned(each)) for each in manifests], [failure_rates(each) for each in games])
     return Comparison(runs=compared, transitions=transitions, histories=found)
 
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pandas as pd
 
 from harness.campaign.storage.run_folder import RunFolder
-from harness.config.pinned_game import PinnedGame
+from harness.config.pinned_game import PinnedGame, PinnedStart
 from harness.config.toml_reading import read_document
 from harness.evaluation.start_space import Boundary, start_quantities
-from harness.game.initial_state import draw_initial_state
+from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.seeding import parts_of
 from harness.road.scene.open_scene import OpenScene
 
@@ -22,8 +22,7 @@ def drawn_starts(scene: OpenScene, start_seed: int, episodes: Iterable[int]) -> 
     drawn = [draw_initial_state(scene.usual_starts, *parts_of(start_seed, episode)) for episode in numbers]
     if not drawn:
         return pd.DataFrame()
-    position_m, speed_mps = (np.array([getattr(each, name) for each in drawn]) for name in ("position_m", "speed_mps"))
-    found = start_quantities(scene.places, position_m, speed_mps)
+    found = _quantities(scene, drawn)
     found["friction"] = [each.friction for each in drawn]
     found["visibility_m"] = [each.visibility_m for each in drawn]
     found["speed_limit_share"] = [each.limit_share for each in drawn]
@@ -41,6 +40,9 @@ def found_boundaries(folder: RunFolder, scene: OpenScene) -> list[Boundary]:
 
 def _boundary(game: PinnedGame, scene: OpenScene) -> Boundary:
     starts = [each for each in (game.drawn_start, game.start, game.no_failure_from) if each is not None]
+    return Boundary(arm=game.arm, seed=game.seed, episode=game.episode, starts=_quantities(scene, starts))
+
+
+def _quantities(scene: OpenScene, starts: Sequence[InitialState] | Sequence[PinnedStart]) -> pd.DataFrame:
     position_m, speed_mps = (np.array([getattr(each, name) for each in starts]) for name in ("position_m", "speed_mps"))
-    quantities = start_quantities(scene.places, position_m, speed_mps)
-    return Boundary(arm=game.arm, seed=game.seed, episode=game.episode, starts=quantities)
+    return start_quantities(scene.places, position_m, speed_mps)

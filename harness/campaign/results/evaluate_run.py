@@ -8,13 +8,14 @@ from typing import Any
 
 import pandas as pd
 
-from harness.campaign.plan.stages import AssessmentStage, TrainingStage, stage_id
+from harness.campaign.plan.stages import AssessmentStage, arms_of, stage_id, strategies_of
 from harness.campaign.results.drawn_starts import drawn_starts
 from harness.campaign.results.matchups import matchups_of
 from harness.campaign.results.read_run import ReadRun
 from harness.campaign.results.run_people import by_who_drove, declared_of, failures_by_trait, is_played, questions_of
 from harness.campaign.storage.learned import judged
 from harness.campaign.storage.manifest import is_tuned
+from harness.config.campaign import Campaign
 from harness.evaluation.comparisons.acceptance_checks import Evidence, judge
 from harness.evaluation.comparisons.comparison import compare, games_by_arm
 from harness.evaluation.comparisons.over_trainings import compare_over_trainings
@@ -25,9 +26,9 @@ from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.competence import Goals, goals_alone
 from harness.evaluation.game_theory.findings import GameFindings, find
 from harness.evaluation.realism import OF_DRIVERS, OF_RIDERS, OF_WALKERS, HumanFigure, realism
-from harness.evaluation.strategies import Arm
 from harness.evaluation.tables import table_of
 from harness.reports.run_tables import RunTables
+from harness.road.scene.open_scene import OpenScene
 
 
 def evaluated(run: ReadRun) -> RunTables:
@@ -38,13 +39,14 @@ def evaluated(run: ReadRun) -> RunTables:
     if run.reference_drivers is not None:
         counts = count_prevented(run.reference_drivers, run.episodes)
         prevented = {"reference_drivers": run.reference_drivers, "preventability": counts}
-    found = realism(run.conduct, _arms(run), declared_of(run), _figures_of_people(run))
+    arms = arms_of(run.stages)
+    found = realism(run.conduct, arms, declared_of(run), _figures_of_people(run.scene))
     asked, significance = questions_of(run, found), run.campaign.assessment.significance
     played = [each for each in asked if is_played(each, run)]
     tables = RunTables(
         manifest=manifest,
-        arms=_arms(run),
-        strategies={stage.name: stage.strategy for stage in run.stages if isinstance(stage, TrainingStage)},
+        arms=arms,
+        strategies=strategies_of(run.stages),
         episodes=run.episodes,
         summary=summarise(run.episodes),
         comparisons=compare(played, run.episodes, significance, planned=len(asked)),
@@ -52,20 +54,26 @@ def evaluated(run: ReadRun) -> RunTables:
         training=_with_ends(run.training, entries),
         reconfiguration=run.reconfiguration,
         selections=run.selections,
-        shields=compare_shielded(_arms(run), run.episodes),
-        perception=compare_perception(_arms(run), run.episodes, len(run.campaign.seeds)),
+        shields=compare_shielded(arms, run.episodes),
+        perception=compare_perception(arms, run.episodes, len(run.campaign.seeds)),
         manoeuvres=run.manoeuvres,
         causes=run.causes,
         takeovers=run.takeovers,
         starts=drawn_starts(run.scene, run.campaign.start_seed, run.episodes["episode"]),
         realism=found,
         game=_game(run),
-        non_ego_drives=_people_drive(run),
+        non_ego_drives=people_drive(run.scene),
         populations=by_who_drove(run.campaign, run.episodes),
         **failures_by_trait(run),
         **prevented,
     )
-    acceptance = run.campaign.acceptance
+    return with_acceptance(tables, run.campaign, is_judged=run.reference_drivers is not None)
+
+
+def with_acceptance(tables: RunTables, campaign: Campaign, is_judged: bool) -> RunTables:
+    """The tables with the checks of the campaign's bounds, if it has some. `is_judged`: reference drivers judged the
+    failures."""
+    acceptance = campaign.acceptance
     if acceptance is None:
         return tables
     evidence = Evidence(
@@ -74,10 +82,10 @@ def evaluated(run: ReadRun) -> RunTables:
         summary=tables.summary,
         comparisons=tables.comparisons,
         gaps=tables.game.gaps if tables.game is not None else table_of("gaps"),
-        preventability=tables.preventability if run.reference_drivers is not None else None,
+        preventability=tables.preventability if is_judged else None,
     )
-    personas = [*run.manifest["personas"], *run.campaign.mixed_people]
-    return replace(tables, acceptance=judge(acceptance.bounds, acceptance.ego, personas, run.campaign.seeds, evidence))
+    personas = [*tables.manifest["personas"], *campaign.mixed_people]
+    return replace(tables, acceptance=judge(acceptance.bounds, acceptance.ego, personas, campaign.seeds, evidence))
 
 
 def csv_tables(run: ReadRun, tables: RunTables) -> dict[str, pd.DataFrame]:
@@ -95,18 +103,15 @@ def csv_tables(run: ReadRun, tables: RunTables) -> dict[str, pd.DataFrame]:
     return found | (tables.game.tables if tables.game is not None else {})
 
 
-def _arms(run: ReadRun) -> dict[str, Arm]:
-    return {stage.name: stage.arm for stage in run.stages if isinstance(stage, AssessmentStage)}
+def people_drive(scene: OpenScene) -> bool:
+    """Whether all people of a scene are drivers of cars."""
+    return all(each.drives for each in scene.document.non_ego)
 
 
-def _people_drive(run: ReadRun) -> bool:
-    return all(each.drives for each in run.scene.document.players[1:])
-
-
-def _figures_of_people(run: ReadRun) -> tuple[HumanFigure, ...]:
-    if _people_drive(run):
+def _figures_of_people(scene: OpenScene) -> tuple[HumanFigure, ...]:
+    if people_drive(scene):
         return OF_DRIVERS
-    return OF_WALKERS if all(each.on_foot for each in run.scene.document.players[1:]) else OF_RIDERS
+    return OF_WALKERS if all(each.on_foot for each in scene.document.non_ego) else OF_RIDERS
 
 
 def _goals(run: ReadRun) -> dict[str, Goals]:

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pandas as pd
 
-from harness.campaign.plan.stages import AssessmentStage
+from harness.campaign.plan.stages import arms_of
 from harness.campaign.results.league_rows import person_in, shield_in
-from harness.campaign.storage.manifest import planned
+from harness.campaign.storage.manifest import campaign_in, planned
 from harness.campaign.storage.run_folder import MANIFEST, RunFolder
-from harness.config.campaign import Assessment, Campaign
+from harness.config.campaign import Assessment
 from harness.errors import UsageError
 from harness.evaluation.comparisons.tied_ranks import GAME, PLAYER, league_ranks
 from harness.evaluation.tables import read_csv, write_csv
@@ -49,8 +49,8 @@ def _games_of(league: Path) -> pd.DataFrame:
         episodes = read_csv(run.path / "episodes.csv")
         played = episodes[(episodes["error"] == "") & episodes["ego_failed"].notna()]
         manifest = run.manifest()
-        campaign = Campaign.model_validate(manifest["campaign"], strict=False)
-        arms = {stage.name: stage.arm for stage in planned(manifest) if isinstance(stage, AssessmentStage)}
+        campaign = campaign_in(manifest)
+        arms = arms_of(planned(manifest))
         people = {name: person_in(arm) for name, arm in arms.items()}
         shields = {name: shield_in(arm, campaign) for name, arm in arms.items()}
         named = played.assign(scene=scene_of(manifest), person=played["arm"].map(people), ego=ego)

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from harness.campaign.plan.alone_bounds import alone_bounds
-from harness.campaign.plan.stages import AssessmentStage
-from harness.campaign.storage.manifest import planned
+from harness.campaign.plan.stages import arms_of
+from harness.campaign.storage.manifest import campaign_in, planned
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign
 from harness.evaluation.comparisons.comparison import games_by_arm, rate_cells
@@ -75,8 +75,8 @@ def _rows(ego: str, run: RunFolder, games: dict[tuple[str, str, int], str]) -> I
         read_csv(run.path / f"{name}.csv") for name in ("summary", "episodes", "manoeuvres")
     )
     manifest, games_of = run.manifest(), games_by_arm(episodes)
-    scene, campaign = scene_of(manifest), Campaign.model_validate(manifest["campaign"], strict=False)
-    arms = {stage.name: stage.arm for stage in planned(manifest) if isinstance(stage, AssessmentStage)}
+    scene, campaign = scene_of(manifest), campaign_in(manifest)
+    arms = arms_of(planned(manifest))
     file = run.path / "preventability.csv"
     prevented = read_csv(file) if file.is_file() else None
     page = (run.path / "report.html").read_text(encoding="utf-8")

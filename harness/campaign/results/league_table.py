@@ -8,7 +8,6 @@ junit.xml      a test for each pairing and each stage: an error where games coul
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +15,7 @@ from typing import Any
 
 import pandas as pd
 
-from harness.campaign.results.ci_files import JUNIT, RESULT
+from harness.campaign.results.ci_files import JUNIT, RESULT, write_record
 from harness.campaign.results.kept_results import RunResult
 from harness.campaign.results.league_rows import league_rows
 from harness.campaign.storage.run_folder import RunFolder
@@ -65,8 +64,7 @@ def write_league(ego: str, folder: Path, results: Mapping[str, RunResult]) -> Le
     exit_code = FAILED if failed else 0
     cells = [{name: _in_json(cell) for name, cell in row.items()} for row in table.to_dict("records")]
     record = {"ego": ego, "exit_code": exit_code, "failed": failed, "rows": cells, "versions": versions()}
-    text = json.dumps(record, indent=1, ensure_ascii=False, allow_nan=False)
-    write_atomically(folder / RESULT, (text + "\n").encode("utf-8", errors="backslashreplace"))
+    write_record(folder / RESULT, record)
     return LeagueResult(table=table, failed=failed, exit_code=exit_code, record=record)
 
 

@@ -11,11 +11,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import pandas as pd
-from jinja2 import Template
 
 from harness.campaign.plan.planned_drivers import Trained
 from harness.campaign.plan.stages import AssessmentStage
-from harness.campaign.storage.manifest import planned
+from harness.campaign.storage.manifest import campaign_in, planned
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign
 from harness.config.persona import Persona
@@ -65,18 +64,8 @@ def card_of_many(stage: str, manifest: Mapping[str, Any], summary: pd.DataFrame,
         alone, naive = rows.get(persona_alone(persona).name), rows.get(against_persona(NaiveEgo(), persona).name)
         goals = [_cells(row, is_ego=False)[1] if row else "" for row in (alone, naive)]
         figures.append((persona, [*goals, _cells(naive, is_ego=True)[1] if naive else ""]))
-    text = _template("card_of_many").render(
-        stage=stage,
-        campaign=manifest["name"],
-        version=manifest["versions"]["harness"],
-        quick=manifest["quick"],
-        not_learned=stopped(entry) if entry["stopped"] == DID_NOT_LEARN else "",
-        facts=list(_training_facts(entry, manifest, policy)),
-        figures=figures,
-        settings=_settings(policy),
-        versions=_versions(manifest),
-    )
-    return text.strip() + "\n"
+    facts = _training_facts(entry, manifest, policy)
+    return _rendered("card_of_many", stage, manifest, entry, policy, facts=list(facts), figures=figures)
 
 
 def model_card(
@@ -88,15 +77,13 @@ def model_card(
     document = manifest["ego_persona"] if is_ego else manifest["persona_documents"][entry["persona"]]
     persona = Persona.from_record(document)
     profile = persona_profile(persona)
-    text = _template("model_card").render(
-        stage=stage,
+    return _rendered(
+        "model_card",
+        stage,
+        manifest,
+        entry,
+        policy,
         is_ego=is_ego,
-        entry=entry,
-        policy=policy,
-        campaign=manifest["name"],
-        version=manifest["versions"]["harness"],
-        quick=manifest["quick"],
-        not_learned=stopped(entry) if entry["stopped"] == DID_NOT_LEARN else "",
         facts=list(_facts(entry, manifest, policy, persona)),
         persona=persona,
         alpha=" + ".join(f"{getattr(persona, group).weight:g} × {group}" for group in GROUPS),
@@ -105,25 +92,34 @@ def model_card(
         sources=persona.sources,
         figures=list(_figures(stage, manifest, summary, is_ego)),
         crashes="" if is_ego else crashes_alone(realism, entry["name"], entry["seed"]),
-        settings=_settings(policy),
-        versions=_versions(manifest),
     )
-    return text.strip() + "\n"
 
 
-def _template(name: str) -> Template:
+def _rendered(
+    template: str,
+    stage: str,
+    manifest: Mapping[str, Any],
+    entry: Mapping[str, Any],
+    policy: Mapping[str, Any],
+    **own: object,
+) -> str:
+    """The text of a card, from what all cards have and what this one has."""
     environment = environment_of("campaign/results", autoescape=False)
     environment.filters["one_line"] = _one_line
-    return environment.get_template(f"{name}.md.jinja")
-
-
-def _settings(policy: Mapping[str, Any]) -> list[tuple[str, str]]:
-    return [(name, _shown(value)) for name, value in policy["training"].items()]
-
-
-def _versions(manifest: Mapping[str, Any]) -> str:
     versions = manifest["versions"]
-    return ", ".join(f"{name} {versions[name]}" for name in _PROGRAMS if name in versions)
+    text = environment.get_template(f"{template}.md.jinja").render(
+        stage=stage,
+        entry=entry,
+        policy=policy,
+        campaign=manifest["name"],
+        version=versions["harness"],
+        quick=manifest["quick"],
+        not_learned=stopped(entry) if entry["stopped"] == DID_NOT_LEARN else "",
+        settings=[(name, _shown(value)) for name, value in policy["training"].items()],
+        versions=", ".join(f"{name} {versions[name]}" for name in _PROGRAMS if name in versions),
+        **own,
+    )
+    return text.strip() + "\n"
 
 
 def _one_line(text: str) -> str:
@@ -149,7 +145,7 @@ def _facts(
 def _training_facts(
     entry: Mapping[str, Any], manifest: Mapping[str, Any], policy: Mapping[str, Any]
 ) -> Iterator[tuple[str, str]]:
-    campaign = Campaign.model_validate(manifest["campaign"], strict=False)
+    campaign = campaign_in(manifest)
     against = policy["against"]
     yield "scene", f"`{policy['scene']}`"
     if roads := policy.get("roads"):

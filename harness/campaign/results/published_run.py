@@ -6,14 +6,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from harness.campaign.plan.stages import AssessmentStage, TrainingStage
+from harness.campaign.plan.stages import arms_of, strategies_of
 from harness.campaign.results.drawn_starts import drawn_starts
+from harness.campaign.results.evaluate_run import people_drive, with_acceptance
 from harness.campaign.results.matchups import matchups_of
 from harness.campaign.results.served_report import PAGE
-from harness.campaign.storage.manifest import is_tuned, planned
+from harness.campaign.storage.manifest import campaign_in, done_in, is_tuned, planned
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign
-from harness.evaluation.comparisons.acceptance_checks import Evidence, judge
 from harness.evaluation.game_theory.findings import GameFindings, cautions
 from harness.evaluation.tables import read_csv, table_of
 from harness.files import has_digest
@@ -50,32 +50,19 @@ class PublishedReport:
 def published_tables(folder: RunFolder) -> RunTables:
     """The tables of a published run, as far as they are published. Raises UsageError for a damaged one."""
     manifest = folder.manifest()
-    stages, campaign = planned(manifest), Campaign.model_validate(manifest["campaign"], strict=False)
-    arms = {each.name: each.arm for each in stages if isinstance(each, AssessmentStage)}
+    stages, campaign = planned(manifest), campaign_in(manifest)
     names = [*_ALWAYS, *(name for name in _MAYBE if _is_there(folder.path, name))]
     frames: dict[str, Any] = {name: read_csv(folder.path / f"{name}.csv") for name in names}
     tables = RunTables(
         manifest=manifest,
-        arms=arms,
-        strategies={each.name: each.strategy for each in stages if isinstance(each, TrainingStage)},
+        arms=arms_of(stages),
+        strategies=strategies_of(stages),
         is_from_tables=True,
         **frames,
     )
     tables = _with_scene(tables, campaign)
     tables = replace(tables, game=_game(folder, campaign, tables))
-    acceptance = campaign.acceptance
-    if acceptance is None:
-        return tables
-    evidence = Evidence(
-        arms=arms,
-        episodes=tables.episodes,
-        summary=tables.summary,
-        comparisons=tables.comparisons,
-        gaps=tables.game.gaps if tables.game is not None else table_of("gaps"),
-        preventability=tables.preventability if "preventability" in frames else None,
-    )
-    personas = [*manifest["personas"], *campaign.mixed_people]
-    return replace(tables, acceptance=judge(acceptance.bounds, acceptance.ego, personas, campaign.seeds, evidence))
+    return with_acceptance(tables, campaign, is_judged="preventability" in frames)
 
 
 def _is_there(folder: Path, name: str) -> bool:
@@ -89,7 +76,7 @@ def _with_scene(tables: RunTables, campaign: Campaign) -> RunTables:
     if not folder.is_dir():
         return tables
     scene = open_scene(folder)
-    tables = replace(tables, non_ego_drives=all(each.drives for each in scene.document.players[1:]))
+    tables = replace(tables, non_ego_drives=people_drive(scene))
     files = {Path(file): digest for file, digest in tables.manifest["hashes"].items()}
     digests = {file.name: digest for file, digest in files.items() if file.parent.name == folder.name}
     if not (digests and all(has_digest(folder / name, [digest]) for name, digest in digests.items())):
@@ -99,8 +86,7 @@ def _with_scene(tables: RunTables, campaign: Campaign) -> RunTables:
 
 def _game(folder: RunFolder, campaign: Campaign, tables: RunTables) -> GameFindings | None:
     manifest = tables.manifest
-    done = {name for name, entry in manifest["stages"].items() if entry["status"] == "done"}
-    game = matchups_of(campaign, manifest["personas"], done, is_tuned(manifest))
+    game = matchups_of(campaign, manifest["personas"], done_in(manifest), is_tuned(manifest))
     if game is None:
         return None
     found = {

@@ -14,7 +14,7 @@ from rich.console import Console
 from harness.campaign.plan.stages import Stage, stage_id
 from harness.campaign.results.shown_work import doing
 from harness.campaign.storage.arm_tables import PLAYED, arm_tables
-from harness.campaign.storage.manifest import planned
+from harness.campaign.storage.manifest import campaign_in, done_in, planned
 from harness.campaign.storage.run_folder import JUDGED, SELECTED, TAKEN_OVER, RunFolder
 from harness.config.campaign import Campaign
 from harness.config.toml_reading import Document
@@ -62,7 +62,7 @@ class ReadRun:
     @property
     def done(self) -> set[str]:
         """The stages that are done, by id."""
-        return {name for name, entry in self.manifest["stages"].items() if entry["status"] == "done"}
+        return set(done_in(self.manifest))
 
 
 def read_run(folder: RunFolder, console: Console) -> ReadRun:
@@ -70,18 +70,18 @@ def read_run(folder: RunFolder, console: Console) -> ReadRun:
     are missing or damaged."""
     manifest = folder.manifest()
     folder.check_whole(manifest)
-    campaign = Campaign.model_validate(manifest["campaign"], strict=False)
+    campaign = campaign_in(manifest)
     scene = open_scene(folder.scene)
-    for stage in _done(manifest, "assessment"):
+    for stage in done_in(manifest, "assessment"):
         _check_log(folder, stage, manifest["stages"][stage])
     training = joined("training", _gathered(folder, manifest, "training", "training.csv"))
     searches = joined("reconfiguration", _gathered(folder, manifest, "reconfiguration", "reconfiguration.csv"))
     selections = joined("selections", _gathered(folder, manifest, "selection", SELECTED))
-    made = [stage for kind in ("training", "conditioning", "selection") for stage in _done(manifest, kind)]
+    made = [stage for kind in ("training", "conditioning", "selection") for stage in done_in(manifest, kind)]
     policies = {stage: _policy(folder.policy(stage)) for stage in made}
     judged, courses = (list(_gathered(folder, manifest, "preventability", table)) for table in (JUDGED, TAKEN_OVER))
     with doing(console, "measuring the games"):
-        arms = [arm_tables(folder, stage, scene) for stage in _done(manifest, "assessment")]
+        arms = [arm_tables(folder, stage, scene) for stage in done_in(manifest, "assessment")]
     return ReadRun(
         manifest=manifest,
         campaign=campaign,
@@ -115,11 +115,6 @@ def episodes_of(folder: RunFolder) -> pd.DataFrame:
     return episodes
 
 
-def _done(manifest: Mapping[str, Any], kind: str) -> list[str]:
-    entries = manifest["stages"].items()
-    return [name for name, entry in entries if entry["kind"] == kind and entry["status"] == "done"]
-
-
 def _policy(folder: Path) -> dict[str, Any]:
     """The content of a policy's JSON. Raises UsageError where it does not have the form that a training writes."""
     card = read_card(folder)
@@ -140,7 +135,7 @@ def _check_log(folder: RunFolder, stage: str, entry: Mapping[str, Any]) -> None:
 
 
 def _gathered(folder: RunFolder, manifest: Mapping[str, Any], kind: str, table: str) -> Iterator[pd.DataFrame]:
-    for stage in _done(manifest, kind):
+    for stage in done_in(manifest, kind):
         file = folder.work(stage) / table
         frame = read_csv(file)
         match kind:

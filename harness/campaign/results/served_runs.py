@@ -8,13 +8,13 @@ from pathlib import Path
 from threading import Lock
 from urllib.parse import parse_qs, quote, unquote, urlsplit
 
-from harness.campaign.plan.stages import Stage, TrainingStage
+from harness.campaign.plan.stages import Stage, TrainingStage, strategies_of
 from harness.campaign.plan.strategy_stages import training_settings
 from harness.campaign.results.compare_runs import compare_runs
 from harness.campaign.results.published_run import PublishedReport
 from harness.campaign.results.run_index import begun_once, has_page, indexed_run, runs_in
 from harness.campaign.results.served_report import PAGE, ServedReport
-from harness.campaign.storage.manifest import planned
+from harness.campaign.storage.manifest import campaign_in, planned
 from harness.campaign.storage.run_folder import MANIFEST, RunFolder
 from harness.campaign.storage.training_curves import CHECKPOINT, curves_so_far
 from harness.config.campaign import Campaign
@@ -89,7 +89,7 @@ def running_page(path: Path) -> str:
     if run.state == "unreadable":
         raise UsageError.of(path, "", run.problem, "restore the folder, or run the campaign again into another one")
     manifest = folder.manifest()
-    stages, campaign = planned(manifest), Campaign.model_validate(manifest["campaign"], strict=False)
+    stages, campaign = planned(manifest), campaign_in(manifest)
     training = curves_so_far(folder, stages)
     steps = {
         (stage, seed): int(most) for (stage, seed), most in training.groupby(["stage", "seed"])["steps"].max().items()
@@ -100,8 +100,7 @@ def running_page(path: Path) -> str:
         for each in stages
         if each.id in run.running
     ]
-    strategies = {each.name: each.strategy for each in stages if isinstance(each, TrainingStage)}
-    learned = learning(RunTables(manifest=manifest, strategies=strategies, training=training))
+    learned = learning(RunTables(manifest=manifest, strategies=strategies_of(stages), training=training))
     going_on = {each.name for each in stages if each.id in run.running}
     curves = sorted(learned, key=lambda curve: curve["stage"] not in going_on)
     return render_running(run, shown, manifest["stages"], curves)

@@ -7,7 +7,6 @@ from typing import Any, TypeAlias
 
 from harness.campaign.results.kept_results import RunResult, ShownLine
 from harness.campaign.storage.learned import did_not_learn
-from harness.campaign.storage.manifest import FINISHED
 from harness.config.campaign import Campaign
 from harness.errors import plain
 from harness.evaluation.unplayed_games import reasons_of
@@ -42,8 +41,7 @@ def shown_result(campaign: Campaign, tables: RunTables, verdicts: Verdicts) -> R
         lines=tuple(_lines(campaign, tables, verdicts)),
         failed_stages={
             name: plain((entry.get("message") or "").strip().rpartition("\n")[2][:1000])
-            for name, entry in tables.stages.items()
-            if entry["status"] not in FINISHED
+            for name, entry in tables.unfinished.items()
         },
         error_games=int((tables.episodes["error"] != "").sum()),
         error_reasons=tuple(map(plain, reasons_of(tables.episodes["error"]))),

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from harness.files import content_of, sync_file, sync_folder, write_atomically
+from harness.files import content_of, digest_of_file, sync_file, sync_folder, write_atomically
 
 _MOST_BYTES = 50_000_000
 
@@ -71,9 +72,4 @@ def _matches(file: Path, expected: Any) -> bool:
 
 
 def _checksum(file: Path) -> dict[str, Any]:
-    with file.open("rb") as content:
-        digest, size = hashlib.sha256(), 0
-        while piece := content.read(1 << 20):
-            digest.update(piece)
-            size += len(piece)
-    return {"bytes": size, "sha256": digest.hexdigest()}
+    return {"bytes": file.stat().st_size, "sha256": digest_of_file(file, math.inf)}

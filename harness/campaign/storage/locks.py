@@ -13,8 +13,6 @@ from filelock import FileLock, Timeout
 from harness.errors import HarnessError
 from harness.files import make_folder
 
-_LOCK = "*.lock"
-
 
 class InUse(HarnessError):
     """Another process has the lock; the message names it, as far as it is known."""
@@ -66,7 +64,7 @@ def is_held(file: Path) -> bool:
 def wait_for_workers(folder: Path, timeout_s: float) -> None:
     """Wait until no process is registered in a folder. Raises InUse if one still is after `timeout_s`."""
     until = time.monotonic() + timeout_s
-    for file in sorted(folder.glob(_LOCK)):
+    for file in sorted(folder.glob("*.lock")):
         try:
             with _held(file, max(until - time.monotonic(), 0.0)):
                 file.unlink(missing_ok=True)

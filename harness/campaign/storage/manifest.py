@@ -162,10 +162,20 @@ def checksum_of_content(manifest: Mapping[str, Any]) -> str:
     return digest_of({key: value for key, value in manifest.items() if key != "sha256"})
 
 
+def campaign_in(manifest: Mapping[str, Any]) -> Campaign:
+    """The campaign of a run."""
+    return Campaign.model_validate(manifest["campaign"], strict=False)
+
+
 def planned(manifest: Mapping[str, Any]) -> list[Stage]:
     """Every stage of the plan of a run, each after those it needs."""
-    campaign = Campaign.model_validate(manifest["campaign"], strict=False)
-    return plan(campaign, manifest["personas"], is_tuned(manifest), traits_in(manifest))
+    return plan(campaign_in(manifest), manifest["personas"], is_tuned(manifest), traits_in(manifest))
+
+
+def done_in(manifest: Mapping[str, Any], kind: str | None = None) -> list[str]:
+    """The stages of a run that are done, by id; those of one kind, if it is given."""
+    entries = manifest["stages"].items()
+    return [name for name, entry in entries if entry["status"] == "done" and kind in (None, entry["kind"])]
 
 
 def traits_in(manifest: Mapping[str, Any]) -> PersonTraits:

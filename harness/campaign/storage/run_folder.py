@@ -38,6 +38,7 @@ from harness.campaign.storage.manifest import (
     Manifest,
     StageEntry,
     checksum_of_content,
+    done_in,
     read_manifest,
 )
 from harness.campaign.storage.run_log import LOG, run_log
@@ -215,7 +216,7 @@ class RunFolder:
         are not what the stages wrote, and where the manifest is not what the campaign wrote."""
         self.check_unpublished(manifest)
         damaged = [] if manifest.get("sha256") == checksum_of_content(manifest) else [self.manifest_file]
-        for name in (name for name, entry in manifest["stages"].items() if entry["status"] == "done"):
+        for name in done_in(manifest):
             record = self.done(name)
             damaged += [self.work(name) / "done.json"] if record is None else mismatches(record, self.path)
         _refuse([*damaged, *self._changed_scene(manifest)], _RUN)
@@ -241,15 +242,12 @@ class RunFolder:
         where the campaign has not ended. A published folder is not checked."""
         if not self.is_published:
             remedy = f"write the results of what is finished: harness report {self.path}"
-            if read_checksums(self.results) is None:
+            record = read_checksums(self.results)
+            if record is None:
                 raise UsageError.of(self.path, "", "has no results: its campaign has not ended", remedy)
-            _refuse(self._changed_results(MANIFEST), _RUN)
-            _refuse(self._changed_results(name), remedy)
+            _refuse(mismatches(record, self.path, [MANIFEST]), _RUN)
+            _refuse(mismatches(record, self.path, [name]), remedy)
         return self.path / name
-
-    def _changed_results(self, name: str) -> list[Path]:
-        record = read_checksums(self.results)
-        return [] if record is None else mismatches(record, self.path, [name])
 
     def _changed_scene(self, manifest: Mapping[str, Any]) -> list[Path]:
         return [file for file in sorted(self.scene.glob("*")) if not has_digest(file, manifest["hashes"].values())]

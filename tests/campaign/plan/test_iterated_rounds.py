@@ -131,7 +131,7 @@ def test_plan__a_player_goes_on_with_the_best_of_all_its_policies(against: str) 
     for name, selection in selections.items():
         training = stages[f"{name}_answer"]
         assert (selection.opponent, selection.alone_share) == (training.opponent, training.alone_share)
-        assert training.id == selection.answer.stage
+        assert training.id == selection.candidates[-1].stage
         assert training.id in selection.needs
     assert {each.alone_share for each in selections.values()} == {0.25, 0.5}
 
