@@ -20,6 +20,7 @@ from harness.campaign.plan.planned_drivers import (
     Trained,
     TrainedBefore,
     driver_in,
+    members_of,
 )
 from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.storage.manifest import campaign_in, planned
@@ -89,8 +90,9 @@ class RunPlayers:
 
     def seated(self, stage: AssessmentStage) -> SeatedArm:
         """The players of an arm. Raises UsageError if one can't be made."""
-        self.ego(stage)  # with `people`, names what is missing
-        self.people(stage, episode=0)
+        self.ego(stage)
+        for member in members_of(*stage.non_ego):  # a policy that is missing is named
+            self._seated(member, self._players.persona(member))
         return self._players.arm(stage)
 
     def ego(self, stage: AssessmentStage) -> SeatedDriver:
