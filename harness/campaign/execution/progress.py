@@ -101,7 +101,8 @@ class StageProgress:
             self._preparing[event.stage] = event.message
             self.bars.reset(row, unit=unit)
             if event.message and not self._console.is_terminal:
-                self._console.print(f"waiting  {event.stage}: {event.message}", highlight=False, soft_wrap=True, markup=False)
+                line = f"waiting  {event.stage}: {event.message}"
+                self._console.print(line, highlight=False, soft_wrap=True, markup=False)
         self.bars.update(row, completed=event.done, total=event.total or None)
         if not self._console.is_terminal and event.total and self._clock() >= self._line_due_s[event.stage]:
             self._line_due_s[event.stage] = self._clock() + LINE_EVERY_S
