@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from harness.evaluation.comparisons.acceptance_checks import Check, worst_of_each
@@ -27,7 +28,9 @@ class Line:
 
     passed: bool
     title: str
-    """What is limited, and for which persona."""
+    """What is limited, and for whom."""
+    who: str
+    """The persona; with several training seeds, with the seed."""
     sentence: str
     """What was measured, and the bound."""
     measured: bool = True
@@ -41,15 +44,12 @@ class Line:
 def acceptance_lines(checks: Sequence[Check], seeds: int) -> list[Line]:
     """A line for each bound and persona: that of its worst arm and seed. With several training seeds it names its
     seed."""
-    return [
-        Line(
-            passed=check.passed,
-            title=f"{TITLES[check.bound]}, {check.persona}{f', seed {check.seed}' if seeds > 1 else ''}",
-            sentence=sentence(check),
-            measured=check.measured,
-        )
-        for check in worst_of_each(checks)
-    ]
+    lines = []
+    for check in worst_of_each(checks):
+        who = f"{check.persona}, seed {check.seed}" if seeds > 1 else check.persona
+        title, words = f"{TITLES[check.bound]}, {who}", sentence(check)
+        lines.append(Line(passed=check.passed, title=title, who=who, sentence=words, measured=check.measured))
+    return lines
 
 
 def sentence(check: Check) -> str:
@@ -69,7 +69,16 @@ def by_sentence(lines: Sequence[Line]) -> list[Line]:
     alike: dict[tuple[bool, str], list[Line]] = {}
     for line in lines:
         alike.setdefault((line.passed, line.sentence), []).append(line)
-    return [replace(same[0], title="; ".join(each.title for each in same)) for same in alike.values()]
+    bounds = Counter(line.who for line in lines)
+    return [replace(same[0], title="; ".join(_titles(same, bounds))) for same in alike.values()]
+
+
+def _titles(lines: Sequence[Line], bounds: Mapping[str, int]) -> Iterator[str]:
+    """The titles of lines; of somebody whose `bounds` are all among them, one title."""
+    among = Counter(line.who for line in lines)
+    whole = {who for who, count in among.items() if count == bounds[who] > 1}
+    yield from (f"all bounds, {who}" for who in among if who in whole)
+    yield from (line.title for line in lines if line.who not in whole)
 
 
 def headline(checks: Sequence[Check]) -> str:
