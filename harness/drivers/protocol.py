@@ -51,6 +51,7 @@ class Planner(Driver, Protocol):
 def planner_of(driver: Driver | None) -> Planner | None:
     """The planner that a driver is, or that it holds as `wrapped`; None if there is none."""
     within = driver
-    while within is not None and not hasattr(within, "see"):  # isinstance takes 40 microseconds, in every step
+    # in every step: isinstance of a protocol takes 40 microseconds
+    while within is not None and not (hasattr(within, "see") and hasattr(within, "history_s")):
         within = getattr(within, "wrapped", None)
     return cast(Planner | None, within)

@@ -60,7 +60,7 @@ def write_ci_files(
 
 
 def write_record(file: Path, record: Mapping[str, Any]) -> None:
-    """Write JSON for programs. A number that JSON can't write is a null already."""
+    """Write a file of JSON. Raises ValueError for NaN and infinity, which JSON does not have."""
     text = json.dumps(record, indent=1, ensure_ascii=False, allow_nan=False)
     write_atomically(file, (text + "\n").encode("utf-8", errors="backslashreplace"))
 
