@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -59,7 +58,8 @@ def league(
             folder = out or Path("reports") / f"league-{name_of(ego)}"
             names = [each.strip() for each in scenes.split(",")] if scenes is not None else []
             campaigns = open_league(ego, names, folder, episodes=episodes, shield=shield, allow_code=allow_code)
-        outcome = play_league(name_of(ego), campaigns, folder, partial(WorkerPool, jobs=jobs), console)
+        with WorkerPool(None, jobs) as pool:
+            outcome = play_league(name_of(ego), campaigns, folder, pool.of_run, console)
         console.print(league_terminal(outcome.table))
         print_plain([f"League: {folder / 'league.html'}"], console)
         if as_json:

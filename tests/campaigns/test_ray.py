@@ -176,8 +176,8 @@ def test_ray__deaths_of_workers_follow_the_rule_of_the_harness(cluster: Any, tmp
     folder.claim("deaths")
     with ray_cluster(cluster.address, None) as ray, folder.held():
         context = empty_context(folder.path)
-        workers = RayWorkers(context, ray=ray, jobs=2, warn=pytest.fail, work=die_in_segments)
-        run_stages(stages, [], workers, events.append)
+        with RayWorkers(context, ray=ray, jobs=2, warn=pytest.fail, work=die_in_segments) as workers:
+            run_stages(stages, [], workers, events.append)
     told = [f"{event.kind} {event.stage.removesuffix('-seed1')}" for event in events]
     assert told.count("crashed a") == told.count("crashed b") == MOST_CRASHES - 1
     assert told.count("started b") == MOST_CRASHES

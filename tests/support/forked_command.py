@@ -273,7 +273,7 @@ class _Worker:
         self.terminate(signal.SIGKILL)
 
 
-def _start_worker(work: object, context: object) -> tuple[_Worker, Connection]:
+def _start_worker(work: object) -> tuple[_Worker, Connection]:
     """Start a worker, as `worker_pool.start_process` does."""
     ours, theirs = socket.socketpair()
     its_input, stays_open = os.pipe()
@@ -288,7 +288,7 @@ def _start_worker(work: object, context: object) -> tuple[_Worker, Connection]:
     theirs.close()
     connection = Connection(ours.detach())
     with contextlib.suppress(OSError):  # it died: the pool finds that out
-        connection.send((work, context))
+        connection.send(work)
     return _Worker(pid, os.fdopen(stays_open, "wb")), connection
 
 

@@ -42,52 +42,70 @@ def run_campaign(
 
     Raises UsageError if the folder can't be this campaign's. A stage that fails is in the result, not raised.
     """
+    from harness.campaign.results.results import write_results  # imports pandas and statistics
+
     folder.claim(campaign.document.name, campaign.quick)
     with folder.held():
-        with console.status("playing a game twice"):
-            varying = varying_drivers(campaign, folder)
-        differences = (*varying.items(), *campaign.learned_elsewhere.items())
-        for line in (*campaign.scene.warnings, *(plain(f"{driver}: {words}") for driver, words in differences)):
-            console.print(line, style="bold yellow", highlight=False, markup=False)
-        stages = campaign.stages
-        keys = stage_keys(campaign, stages)
-        with console.status("checking what is finished"):
-            manifest = _ManifestKeeper(campaign, folder, stages=stages, keys=keys, varying=varying)
-            folder.keep_scene(campaign.scene.folder, campaign.scene.document.files)
-            finished = [name for name, entry in manifest.content["stages"].items() if entry["status"] in FINISHED]
-            quick = ", quick" if campaign.quick else ""
-            words = "campaign %s%s: %d stages, %d finished"
-            LOGGER.info(words, campaign.document.name, quick, len(stages), len(finished))
-            for stage in stages:
-                LOGGER.debug("%s %s", "finished" if stage.id in finished else "to do   ", stage.id)
-            kept = kept_result(folder, manifest.content) if len(finished) == len(stages) else None
-        if kept is not None:
-            warn(mixed_versions(manifest.content["stages"]), console)
-            console.print(NOTHING_TO_DO, highlight=False)
-            LOGGER.info(NOTHING_TO_DO)
-            return kept
-        _check_learners(stages, finished)
-        folder.results.unlink(missing_ok=True)  # they are those of another manifest
-        if len(finished) < len(stages):
-            left = {"what is left": {"kind": "", "status": "done", "versions": [versions_of_numbers()]}}
-            warn(mixed_versions(manifest.content["stages"] | left), console)
-            with StageProgress(stages, len(finished), console) as progress:
+        kept = _play(campaign, folder, start_workers, console, keep_going)
+        return write_results(folder, console) if kept is None else kept
 
-                def emit(event: Event) -> None:
-                    incapable = did_not_learn(manifest.content["stages"])
-                    manifest.note(event)
-                    progress.show(event)
-                    log_event(event)
-                    for training, shortfall in did_not_learn(manifest.content["stages"]).items():
-                        if training not in incapable:
-                            progress.tell(training, DID_NOT_LEARN, shortfall)
-                            LOGGER.warning("%s: %s: %s", DID_NOT_LEARN, training, shortfall)
 
-                context = run_context_of(campaign, folder, keys, keep_going)
-                run_stages(stages, finished, start_workers(context), emit)
-        from harness.campaign.results.results import write_results  # imports pandas and statistics
+def play_campaign(
+    campaign: OpenCampaign, folder: RunFolder, start_workers: StartWorkers, console: Console
+) -> RunResult | None:
+    """Carry out what is left of a campaign, as `run_campaign` does. The results that are there already, or None: they
+    are to be written."""
+    folder.claim(campaign.document.name, campaign.quick)
+    with folder.held():
+        return _play(campaign, folder, start_workers, console, keep_going=False)
 
-        return write_results(folder, console)
+
+def _play(
+    campaign: OpenCampaign, folder: RunFolder, start_workers: StartWorkers, console: Console, keep_going: bool
+) -> RunResult | None:
+    with console.status("playing a game twice"):
+        varying = varying_drivers(campaign, folder)
+    differences = (*varying.items(), *campaign.learned_elsewhere.items())
+    for line in (*campaign.scene.warnings, *(plain(f"{driver}: {words}") for driver, words in differences)):
+        console.print(line, style="bold yellow", highlight=False, markup=False)
+    stages = campaign.stages
+    keys = stage_keys(campaign, stages)
+    with console.status("checking what is finished"):
+        manifest = _ManifestKeeper(campaign, folder, stages=stages, keys=keys, varying=varying)
+        folder.keep_scene(campaign.scene.folder, campaign.scene.document.files)
+        finished = [name for name, entry in manifest.content["stages"].items() if entry["status"] in FINISHED]
+        quick = ", quick" if campaign.quick else ""
+        words = "campaign %s%s: %d stages, %d finished"
+        LOGGER.info(words, campaign.document.name, quick, len(stages), len(finished))
+        for stage in stages:
+            LOGGER.debug("%s %s", "finished" if stage.id in finished else "to do   ", stage.id)
+        kept = kept_result(folder, manifest.content) if len(finished) == len(stages) else None
+    if kept is not None:
+        warn(mixed_versions(manifest.content["stages"]), console)
+        console.print(NOTHING_TO_DO, highlight=False)
+        LOGGER.info(NOTHING_TO_DO)
+        return kept
+    _check_learners(stages, finished)
+    folder.results.unlink(missing_ok=True)  # they are those of another manifest
+    if len(finished) < len(stages):
+        left = {"what is left": {"kind": "", "status": "done", "versions": [versions_of_numbers()]}}
+        warn(mixed_versions(manifest.content["stages"] | left), console)
+        with StageProgress(stages, len(finished), console) as progress:
+
+            def emit(event: Event) -> None:
+                incapable = did_not_learn(manifest.content["stages"])
+                manifest.note(event)
+                progress.show(event)
+                log_event(event)
+                for training, shortfall in did_not_learn(manifest.content["stages"]).items():
+                    if training not in incapable:
+                        progress.tell(training, DID_NOT_LEARN, shortfall)
+                        LOGGER.warning("%s: %s: %s", DID_NOT_LEARN, training, shortfall)
+
+            context = run_context_of(campaign, folder, keys, keep_going)
+            with start_workers(context) as workers:
+                run_stages(stages, finished, workers, emit)
+    return None
 
 
 def _check_learners(stages: Sequence[Stage], finished: Collection[str]) -> None:

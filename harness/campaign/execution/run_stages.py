@@ -17,6 +17,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from itertools import count
 from typing import Protocol, TypeAlias
@@ -35,7 +36,7 @@ MOST_ABANDONED = 20
 
 
 class Workers(Protocol):
-    """What carries tasks out. Workers exist inside the `with` block; none is left after it, however it ends."""
+    """What carries tasks out."""
 
     @property
     def capacity(self) -> int:
@@ -53,12 +54,9 @@ class Workers(Protocol):
         """
         ...
 
-    def __enter__(self) -> Workers: ...
-    def __exit__(self, *exception: object) -> None: ...
 
-
-StartWorkers: TypeAlias = Callable[[RunContext], Workers]
-"""Makes the workers of a run, from what its stages share."""
+StartWorkers: TypeAlias = Callable[[RunContext], AbstractContextManager[Workers]]
+"""Makes the workers of a run for a `with` block, from what its stages share."""
 
 
 class Crashes:
@@ -208,15 +206,14 @@ def run_stages(
     def is_idle() -> bool:
         return len(running) + len(helping.running) < workers.capacity
 
-    with workers:
-        while True:
-            while is_idle() and (stage := schedule.take()) is not None:
-                running[stage.id] = stage
-                workers.submit(stage, crashes.next_attempt(stage))
-                emit(Event(kind="started", stage=stage.id))
-            while is_idle() and (task := helping.next_help(running.values())) is not None:
-                workers.submit(task, Attempt(first=False, abandoned=crashes.abandoned(task.arm)))
-            if not running and not helping.running:
-                return
-            for event in workers.next_events():
-                handle(event)
+    while True:
+        while is_idle() and (stage := schedule.take()) is not None:
+            running[stage.id] = stage
+            workers.submit(stage, crashes.next_attempt(stage))
+            emit(Event(kind="started", stage=stage.id))
+        while is_idle() and (task := helping.next_help(running.values())) is not None:
+            workers.submit(task, Attempt(first=False, abandoned=crashes.abandoned(task.arm)))
+        if not running and not helping.running:
+            return
+        for event in workers.next_events():
+            handle(event)

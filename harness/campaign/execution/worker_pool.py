@@ -15,7 +15,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 
@@ -27,8 +27,8 @@ _TERMINATING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SI
 _PROGRAM = "import json, sys; sys.path[:] = json.loads(sys.argv[2]); from {0} import serve; serve(int(sys.argv[1]))"
 
 
-def start_process(work: Work, context: RunContext) -> tuple[subprocess.Popen[bytes], Connection]:
-    """Start a worker. It receives (task, attempt) and sends events until the connection is closed.
+def start_process(work: Work) -> tuple[subprocess.Popen[bytes], Connection]:
+    """Start a worker. It receives (context, task, attempt) and sends events until the connection is closed.
 
     Its standard input stays open as long as this process lives. `multiprocessing` starts no worker here: its child
     prints a traceback if the parent is killed before it has sent what the child needs.
@@ -41,7 +41,7 @@ def start_process(work: Work, context: RunContext) -> tuple[subprocess.Popen[byt
         process = subprocess.Popen(arguments, stdin=subprocess.PIPE, pass_fds=(theirs.fileno(),))
     connection = Connection(ours.detach())
     with suppress(OSError):  # it died: the pool finds that out
-        connection.send((work, context))
+        connection.send(work)
     return process, connection
 
 
@@ -71,9 +71,9 @@ def serve(descriptor: int) -> None:
     threading.Thread(target=_end_with_parent, args=(_taken_input(),), daemon=True).start()
     connection = Connection(descriptor)
     try:
-        work, context = connection.recv()
+        work = connection.recv()
         while True:
-            task, attempt = connection.recv()
+            context, task, attempt = connection.recv()
             last = carry_out_in_worker(task, attempt, context=context, work=work, send=connection.send)
             connection.send(last)
     except (EOFError, OSError):  # the parent is gone
@@ -117,7 +117,7 @@ class WorkerPool:
     `work` carries out a task, in a worker.
     """
 
-    def __init__(self, context: RunContext, jobs: int | None, work: Work = carry_out) -> None:
+    def __init__(self, context: RunContext | None, jobs: int | None, work: Work = carry_out) -> None:
         self._context, self._work = context, work
         self.capacity = jobs or cores()
         self._workers: list[_Worker] = []
@@ -126,20 +126,25 @@ class WorkerPool:
         """Give a task to an idle worker, or to a new one."""
         worker = next((each for each in self._workers if each.task is None), None)
         if worker is None:
-            worker = _Worker(*start_process(self._work, self._context))
+            worker = _Worker(*start_process(self._work))
             self._workers.append(worker)
         worker.task = task
         try:
-            worker.connection.send((task, attempt))
+            worker.connection.send((self._context, task, attempt))
         except OSError:  # it died while it was idle
             self._replace(worker)
-            worker.connection.send((task, attempt))
+            worker.connection.send((self._context, task, attempt))
 
     def next_events(self) -> Sequence[Event]:
         """Wait a moment for the busy workers: at most one event of each."""
         busy = [worker for worker in self._workers if worker.task]
         ready = wait([worker.connection for worker in busy], _POLL_S)
         return [self._event_of(worker) for worker in busy if worker.connection in ready]
+
+    def of_run(self, context: RunContext) -> AbstractContextManager[WorkerPool]:
+        """The same processes as the workers of another run, after whose block they go on."""
+        self._context = context
+        return nullcontext(self)
 
     def __enter__(self) -> WorkerPool:
         return self
@@ -167,7 +172,7 @@ class WorkerPool:
     def _replace(self, worker: _Worker) -> int:
         """Wait for a worker that is ending, and start another one in its place. Returns its exit code."""
         code = _wait_for(worker)
-        worker.process, worker.connection = start_process(self._work, self._context)
+        worker.process, worker.connection = start_process(self._work)
         return code
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import logging
 import platform
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
@@ -17,6 +18,7 @@ from harness.version import __version__
 
 LOG = "harness.log"
 LOGGER = logging.getLogger("harness.run")
+LOGGER.setLevel(logging.INFO)
 _LINE = "%(asctime)s %(levelname)-7s %(message)s"
 _TIME = "%Y-%m-%dT%H:%M:%SZ"
 
@@ -53,17 +55,17 @@ def logged_to(handler: logging.Handler, logger: logging.Logger, level: int) -> I
 
 @contextmanager
 def run_log(folder: Path) -> Iterator[None]:
-    """Append what is logged during the block to the log of a run folder, and how the block ended.
+    """Append what this thread logs during the block to the log of a run folder, and how the block ended.
 
     Raises UsageError if the name is taken by something that is no file.
     """
     file = folder / LOG
     if file.is_symlink() or (file.exists() and not file.is_file()):
         raise UsageError.of(file, "", "is not a file", "remove it: the log of the run has this name")
-    handler, level = _LogFile(file, encoding="utf-8"), min(LOGGER.level or logging.INFO, logging.INFO)
+    handler, thread, started = _LogFile(file, encoding="utf-8"), threading.get_ident(), time.monotonic()
     handler.setFormatter(RunLogFormatter())
-    started = time.monotonic()
-    with closing(handler), logged_to(handler, LOGGER, level):
+    handler.addFilter(lambda record: record.thread == thread)
+    with closing(handler), logged_to(handler, LOGGER, LOGGER.level):
         LOGGER.info("harness %s on Python %s, %s", __version__, platform.python_version(), platform.platform())
         try:
             yield

@@ -32,7 +32,8 @@ from tests.support.tiny import (
 
 def run(folder: Path, stages: list[Stage], work: Any, jobs: int = 2) -> list[Event]:
     events: list[Event] = []
-    run_stages(stages, [], WorkerPool(empty_context(folder), jobs, work), events.append)
+    with WorkerPool(empty_context(folder), jobs, work) as workers:
+        run_stages(stages, [], workers, events.append)
     return events
 
 
