@@ -15,13 +15,14 @@ import traceback
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 from harness.campaign.plan.planned_drivers import External
 from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage, plays_with_errors
 from harness.campaign.preflight import OpenCampaign
+from harness.campaign.storage.checksums import checksums_of, digest_of
 from harness.campaign.storage.locks import held_by_worker
 from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.run_log import logged_to
@@ -75,7 +76,8 @@ class RunContext:
 
     def open_scene(self, stage: Stage) -> OpenScene:
         """The scene as a stage plays on it, with the ego's vehicle type and perception errors."""
-        return self._with_errors(open_scene(self.folder.scene, self._vehicle_type(stage)), stage)
+        files = digest_of(checksums_of(self.folder.path, sorted(self.folder.scene.glob("*"))))
+        return self._with_errors(_opened(self.folder.scene, self._vehicle_type(stage), files), stage)
 
     def open_roads(self, stage: TrainingStage) -> list[OpenScene]:
         """The scenes on whose roads a training plays too."""
@@ -91,6 +93,12 @@ class RunContext:
             if isinstance(driver, External) and driver.name:
                 return self.external_driver(driver.name).vehicle_type
         return self.ego_driver.vehicle_type if self.ego_driver is not None else None
+
+
+@lru_cache(maxsize=2)
+def _opened(folder: Path, ego_type: str | None, files: str) -> OpenScene:
+    """A scene, opened once for the stages of a worker. `files` is the digest of its files."""
+    return open_scene(folder, ego_type)
 
 
 def run_context_of(
