@@ -1,0 +1,69 @@
+"""How the egos by rules that are shipped, and SUMO's driver, come through all scenes.
+
+python docs/league/baselines.py play                   # their leagues and ranks: about half an hour on two cores
+python docs/league/baselines.py table reports/league   # the ranks as a Markdown table
+python docs/league/baselines.py scenes reports/league  # the games that each ego fails, by scene
+"""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+from typing import Annotated
+
+import pandas as pd
+import typer
+
+from harness.evaluation.comparisons.tied_ranks import with_shield
+from harness.evaluation.tables import read_csv
+
+EGOS = ("sumo", "adas", "careful_and_competent", "fuzzy", "rss")
+GAMES = 10
+FOLDER = Path("reports/league")
+Folder = Annotated[Path, typer.Argument(help="The folder of the leagues.")]
+app = typer.Typer(no_args_is_help=True, add_completion=False)
+
+
+@app.command()
+def play() -> None:
+    """Play the league of each ego, with and without a shield, and rank them. Run it again to continue."""
+    for ego in EGOS:
+        shield = () if ego == "sumo" else ("--shield", "rss")  # SUMO's driver has no decision to check
+        _run("league", "--ego", ego, *shield, "--episodes", GAMES, "--out", FOLDER / ego)
+    _run("league-table", FOLDER)
+
+
+def _run(*words: object) -> None:
+    subprocess.run(["harness", *map(str, words)], check=True)
+
+
+@app.command()
+def table(folder: Folder = FOLDER) -> None:
+    """Print the ranks."""
+    ranks = read_csv(folder / "league_ranks.csv")
+    print("| rank | ego | games | fails | 95 % | told apart from |")
+    print("| ---: | --- | ---: | ---: | --- | --- |")
+    for row in ranks.to_dict("records"):
+        interval = f"{row['failure_rate_low']:.1%} to {row['failure_rate_high']:.1%}"
+        cells = [row["rank"], with_shield(row["ego"], row["shield"]), row["games"], f"{row['failure_rate']:.1%}"]
+        cells += [interval, row["told_apart"].replace(" + ", ", ") or "none"]
+        print(f"| {' | '.join(map(str, cells))} |")
+
+
+@app.command()
+def scenes(folder: Folder = FOLDER) -> None:
+    """Print the games that each ego fails, by scene: those alone, beside SUMO's driver and beside people together."""
+    rows = pd.concat([read_csv(folder / ego / "league.csv") for ego in EGOS], ignore_index=True)
+    rows["failed"] = rows["failure_rate"] * rows["episodes"]
+    rows["player"] = [with_shield(*each) for each in zip(rows["ego"], rows["shield"], strict=True)]
+    failed = rows.pivot_table(index="scene", columns="player", values=["failed", "episodes"], aggfunc="sum")
+    players = list(dict.fromkeys(rows["player"]))
+    print(f"| scene | {' | '.join(players)} |")
+    print(f"| --- | {' | '.join(['---:'] * len(players))} |")
+    for scene, of_scene in failed.iterrows():
+        cells = (f"{of_scene['failed', each]:.0f} of {of_scene['episodes', each]:.0f}" for each in players)
+        print(f"| `{scene}` | {' | '.join(cells)} |")
+
+
+if __name__ == "__main__":
+    app()
