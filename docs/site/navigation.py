@@ -68,6 +68,7 @@ SECTIONS = {
         "personas-on-the-merge",
         "game-on-the-merge",
         "robust",
+        "baselines",
         "reproduction",
         "reproduction-assumptions",
         "realism",

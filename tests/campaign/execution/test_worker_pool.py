@@ -96,6 +96,22 @@ def test_run_stages__each_after_what_it_needs(tmp_path: Path) -> None:
     assert not workers_of(os.getpid())
 
 
+def test_of_run__the_same_workers_carry_out_one_run_after_the_other(tmp_path: Path) -> None:
+    events: list[Event] = []
+    work: Any = note
+    with WorkerPool(None, 1, work) as pool:
+        for name in ("first", "second"):
+            (tmp_path / name).mkdir()
+            with pool.of_run(empty_context(tmp_path / name)) as workers:
+                run_stages([stage(name)], [], workers, events.append)
+        assert len(workers_of(os.getpid())) == 1
+    assert len({event.info["pid"] for event in events if event.kind == "done"}) == 1
+    assert [(tmp_path / name / "done").read_text() for name in ("first", "second")] == [
+        "first-seed1\n",
+        "second-seed1\n",
+    ]
+
+
 def test_run_stages__progress_is_told_but_not_all_of_it(tmp_path: Path) -> None:
     events = [event for event in run(tmp_path, [stage("a")], report_much) if event.kind == "progress"]
     assert 1 <= len(events) < 20

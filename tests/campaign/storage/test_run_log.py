@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from threading import Thread
 
 import pytest
 
@@ -51,6 +52,26 @@ def test_log_event__a_failure_is_an_error_and_can_not_imitate_a_line(tmp_path: P
         "ERROR   failed   naive-seed1: first",
         "    2026-01-01T00:00:00Z INFO \\x1b[2J",
     ]
+
+
+def test_run_log__has_what_its_own_thread_logs(tmp_path: Path) -> None:
+    """A league writes the results of a run while it plays the next one."""
+
+    def write() -> None:
+        with run_log(tmp_path / "written"):
+            LOGGER.info("wrote the results")
+
+    for name in ("played", "written"):
+        (tmp_path / name).mkdir()
+    with run_log(tmp_path / "played"):
+        thread = Thread(target=write)
+        thread.start()
+        thread.join()
+        LOGGER.info("played a game")
+    played, written = ((tmp_path / name / LOG).read_text() for name in ("played", "written"))
+    assert "played a game" in played
+    assert "wrote the results" in written
+    assert "wrote the results" not in played
 
 
 def test_run_log__follows_no_link(tmp_path: Path) -> None:
