@@ -75,7 +75,7 @@ def perceive(car: Car, observation: FloatArray) -> tuple[OwnMotion, Encounters]:
 
 
 def _encounters(car: Car, motion: OwnMotion, others: FloatArray) -> Encounters:
-    seen, ahead, left, closing, across, sin, cos, length, width, *conflict = np.moveaxis(others, -1, 0)
+    seen, ahead, left, closing, across, sin, cos, length, width, *conflict = others.transpose(2, 0, 1)
     own_m, other_m, _, priority = conflict
     own = motion.speed_mps[:, None]
     forward = own + closing
@@ -112,9 +112,10 @@ def _path_at(motion: OwnMotion, ahead_m: FloatArray) -> tuple[FloatArray, FloatA
     left = motion.path_left_m[:, None] + np.concatenate((np.zeros((len(turned), 1)), np.cumsum(steps, axis=1)), axis=1)
     k = np.clip(np.searchsorted(AHEAD_M, ahead_m, side="right") - 1, 0, len(AHEAD_M) - 2)
     share = (ahead_m - AHEAD_M[k]) / (AHEAD_M[k + 1] - AHEAD_M[k])
+    games = np.arange(len(k))[:, None]
 
     def interpolate(values: FloatArray, share: FloatArray) -> FloatArray:
-        low, high = np.take_along_axis(values, k, 1), np.take_along_axis(values, k + 1, 1)
+        low, high = values[games, k], values[games, k + 1]
         return low + share * (high - low)
 
     return interpolate(left, share), interpolate(turned, np.clip(share, 0.0, 1.0))

@@ -8,6 +8,7 @@ continues the request of the step before, because the foot is still on its way t
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -124,6 +125,10 @@ class RulesDriver:
         tables: list[_Law | None] = [getattr(rules, name) for name in REACTIONS]
         self._law = next((table for table in tables if table is not None), None)
         self._reaction = _reaction_by(self._law)
+        wheelbase_m, lag_s = car.limits["wheelbase_m"], car.limits["steering_lag_s"]
+        self._steering_rad = partial(
+            steering_rad, law=rules.lane_keeping, wheelbase_m=wheelbase_m, step_s=car.step_s, lag_s=lag_s
+        )
         self._state: FloatArray = np.zeros((_REQUESTED + 1, 0))
 
     def reset(self, games: IntArray) -> None:
@@ -140,10 +145,7 @@ class RulesDriver:
         cruising = cruise_mps2(motion, encounters, before_mps2=before_mps2, law=rules.cruise, step_s=car.step_s)
         requested = self._react(games, motion, encounters, cruising)
         state[_CRUISING, games], state[_REQUESTED, games] = cruising, requested
-        wheelbase = float(car.actuators.wheelbase_m[0])
-        lag_s = car.limits["steering_lag_s"]
-        steering = steering_rad(motion, law=rules.lane_keeping, wheelbase_m=wheelbase, step_s=car.step_s, lag_s=lag_s)
-        return car.actions(requested, steering, observation)
+        return car.actions(requested, self._steering_rad(motion), observation)
 
     def sees_danger(self, observation: FloatArray) -> BoolArray:
         """[N] whether the rules say danger for observations [N, SIZE], with no reaction under way."""

@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from harness.game.arrays import FloatArray
+from harness.game.arrays import BoolArray, FloatArray
+from harness.game.jit import compiled
 from harness.game.road import AHEAD_M
 from harness.game.route_coordinates import PATH_M
 
@@ -108,8 +109,20 @@ def in_units(observation: FloatArray, max_steering_rad: float) -> FloatArray:
     A divided entry at its bound stands for all values beyond it: a goal at 200 m may be farther away. A compressed
     entry at its bound is a very large number.
     """
-    scaled = np.asarray(observation, dtype=np.float64)
-    bounded = np.clip(scaled, -_NEAR_BOUND, _NEAR_BOUND)
-    values = np.where(COMPRESSED, bounded * SCALE / (1.0 - np.abs(bounded)), scaled * SCALE)
+    values = np.array(observation, dtype=np.float64, order="C")
+    _scale(values.reshape(-1, SIZE), SCALE, COMPRESSED)
     values[..., _LOCK] *= max_steering_rad
     return values
+
+
+@compiled
+def _scale(values: FloatArray, scale: FloatArray, compressed: BoolArray) -> None:
+    """Bring scaled values [N, SIZE] into their units, in place."""
+    for row in range(len(values)):
+        for entry in range(values.shape[1]):
+            value = values[row, entry]
+            if compressed[entry]:
+                value = min(max(value, -_NEAR_BOUND), _NEAR_BOUND)
+                values[row, entry] = value * scale[entry] / (1.0 - abs(value))
+            else:
+                values[row, entry] = value * scale[entry]

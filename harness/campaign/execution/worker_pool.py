@@ -114,7 +114,7 @@ class WorkerPool:
     """Processes of this machine, at most `jobs` (None: one per core), each started when it is needed; see
     `run_stages.Workers`.
 
-    `work` carries out a task, in a worker.
+    `context` is what the stages of the run share; None: `of_run` tells it. `work` carries out a task, in a worker.
     """
 
     def __init__(self, context: RunContext | None, jobs: int | None, work: Work = carry_out) -> None:
