@@ -42,12 +42,14 @@ def run_campaign(
 
     Raises UsageError if the folder can't be this campaign's. A stage that fails is in the result, not raised.
     """
-    from harness.campaign.results.results import write_results  # imports pandas and statistics
-
     folder.claim(campaign.document.name, campaign.quick)
     with folder.held():
         kept = _play(campaign, folder, start_workers, console, keep_going)
-        return write_results(folder, console) if kept is None else kept
+        if kept is not None:
+            return kept
+        from harness.campaign.results.results import write_results  # imports pandas and statistics
+
+        return write_results(folder, console)
 
 
 def play_campaign(
