@@ -53,7 +53,8 @@ def table(folder: Folder = FOLDER) -> None:
 @app.command()
 def scenes(folder: Folder = FOLDER) -> None:
     """Print the games that each ego fails, by scene: those alone, beside SUMO's driver and beside people together."""
-    rows = pd.concat([read_csv(folder / ego / "league.csv") for ego in EGOS], ignore_index=True)
+    leagues = (read_csv(folder / ego / "league.csv").sort_values("shield", kind="stable") for ego in EGOS)
+    rows = pd.concat(leagues, ignore_index=True)
     rows["failed"] = rows["failure_rate"] * rows["episodes"]
     rows["player"] = [with_shield(*each) for each in zip(rows["ego"], rows["shield"], strict=True)]
     failed = rows.pivot_table(index="scene", columns="player", values=["failed", "episodes"], aggfunc="sum")
