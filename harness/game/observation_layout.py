@@ -110,13 +110,13 @@ def in_units(observation: FloatArray, max_steering_rad: float) -> FloatArray:
     entry at its bound is a very large number.
     """
     values = np.array(observation, dtype=np.float64, order="C")
-    _scale(values.reshape(-1, SIZE), SCALE, COMPRESSED)
+    _unscale(values.reshape(-1, SIZE), SCALE, COMPRESSED)
     values[..., _LOCK] *= max_steering_rad
     return values
 
 
 @compiled
-def _scale(values: FloatArray, scale: FloatArray, compressed: BoolArray) -> None:
+def _unscale(values: FloatArray, scale: FloatArray, compressed: BoolArray) -> None:
     """Bring scaled values [N, SIZE] into their units, in place."""
     for row in range(len(values)):
         for entry in range(values.shape[1]):
