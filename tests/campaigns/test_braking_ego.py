@@ -52,35 +52,45 @@ def _write_brake(file: Path) -> None:
 
 
 def rows(league: Path) -> pd.DataFrame:
-    return read_csv(league / "league.csv").set_index(["scene", "person"])
+    """Of each scene, person and training of the person."""
+    return read_csv(league / "league.csv").set_index(["scene", "person", "seed"])
 
 
 def test_rows__every_shipped_person_and_ordinary_traffic_in_every_scene(league: Path) -> None:
-    people = ("nobody", "sumo", "paper_distracted", "paper_speedy")
-    pairings = {("paper_merge", person) for person in people} | {("red_light", "nobody"), ("red_light", "sumo")}
-    assert set(rows(league).index) == pairings
+    """A person has a row for each of its trainings."""
+    merge = [("paper_merge", person, 11) for person in ("nobody", "sumo", "paper_distracted", "paper_speedy")]
+    light = [("red_light", "nobody", 21), ("red_light", "sumo", 21)]
+    light += [("red_light", "red_light_runner", seed) for seed in (21, 22, 23)]
+    assert sorted(rows(league).index) == sorted(merge + light)
     assert set(rows(league)["ego"]) == {"brake"}
     assert set(rows(league)["episodes"]) == {EPISODES}
 
 
 def test_rows__an_ego_that_stands_runs_out_of_time(league: Path) -> None:
     """Alone it brakes to a stand in every game, which hurts nobody, and has no person to prevent anything against."""
-    for scene in ("paper_merge", "red_light"):
-        row = rows(league).loc[scene, "nobody"]
-        assert row[["failure_rate", "failure_rate_high", "hard_brake_rate"]].tolist() == [1.0, 1.0, 1.0]
-        assert row["failure_rate_low"] == pytest.approx(ALL_OF_THREE)
-        assert row[["collisions", "rails", "timeouts", "errors"]].tolist() == [0, 0, EPISODES, 0]
-        assert row["serious_injuries"] == 0.0
-        assert np.isnan(row["preventable_rate"])
+    row = rows(league).loc["paper_merge", "nobody", 11]
+    assert row[["failure_rate", "failure_rate_high", "hard_brake_rate"]].tolist() == [1.0, 1.0, 1.0]
+    assert row["failure_rate_low"] == pytest.approx(ALL_OF_THREE)
+    assert row[["collisions", "rails", "timeouts", "errors"]].tolist() == [0, 0, EPISODES, 0]
+    assert row["serious_injuries"] == 0.0
+    assert np.isnan(row["preventable_rate"])
+
+
+def test_rows__an_ego_that_brakes_for_nothing_is_hit_from_behind(league: Path) -> None:
+    """On the red light's road a car follows it in most games."""
+    row = rows(league).loc["red_light", "nobody", 21]
+    assert row["collisions"] + row["timeouts"] == EPISODES
+    assert row["collisions"] > 0
+    assert row["serious_injuries"] > 0.0
 
 
 def test_rows__of_people_say_nothing_where_the_ego_cannot_drive_the_scene_alone(league: Path) -> None:
     """They are the last, and the page says why."""
     reason = "the ego brake can't drive this scene: alone it reaches its goal in 0 of 3 games (0 %), below 97 %"
     reasons = rows(league)["reason"]
-    assert reasons[reasons == ""].index.tolist() == [("paper_merge", "nobody"), ("red_light", "nobody")]
+    assert sorted(reasons[reasons == ""].index) == [("paper_merge", "nobody", 11), ("red_light", "nobody", 21)]
     assert all(each.startswith(reason) for each in reasons.drop("nobody", level="person"))
-    assert [person for _, person in reasons.index[:2]] == ["nobody", "nobody"]
+    assert reasons.index[:2].get_level_values("person").tolist() == ["nobody", "nobody"]
     page = html.unescape((league / "league.html").read_text(encoding="utf-8"))
     assert all(f"{scene}: {reason}" in page for scene in ("paper_merge", "red_light"))
     assert f"Not answered: {reason}" in (league / "junit.xml").read_text(encoding="utf-8")
@@ -92,7 +102,7 @@ def test_rows__are_those_of_the_run_folders(league: Path) -> None:
     regulation = judged[judged["driver"] == "careful_and_competent"]
     summary = read_csv(league / "paper_merge" / "summary.csv").set_index("arm")
     for person in ("paper_speedy", "paper_distracted"):
-        row, arm = rows(league).loc["paper_merge", person], f"naive_vs_{person}"
+        row, arm = rows(league).loc["paper_merge", person, 11], f"naive_vs_{person}"
         prevented = regulation[regulation["arm"] == arm]["prevented_from_start"].sum()
         assert row["preventable_rate"] == pytest.approx(prevented / EPISODES)
         assert row["mean_speed_mps"] == summary.loc[arm, "mean_speed_mps"]
@@ -100,15 +110,15 @@ def test_rows__are_those_of_the_run_folders(league: Path) -> None:
 
 def test_page__cells_open_games_of_the_reports(league: Path) -> None:
     page = (league / "league.html").read_text(encoding="utf-8")
-    assert page.count('href="red_light/report.html#game=naive_alone,1,') == 2  # in the matrix and in the list
+    assert page.count('href="red_light/report.html#game=naive_alone,21,') == 2  # in the matrix and in the list
     assert "3 of 3" in page
 
 
 def test_files_for_ci__have_each_pairing(league: Path) -> None:
     result = json.loads((league / "result.json").read_text(encoding="utf-8"))
-    assert (result["exit_code"], result["failed"], len(result["rows"])) == (0, [], 6)
+    assert (result["exit_code"], result["failed"], len(result["rows"])) == (0, [], len(rows(league)))
     junit = (league / "junit.xml").read_text(encoding="utf-8")
-    assert 'tests="6"' in junit
+    assert f'tests="{len(rows(league))}"' in junit
     assert "brake fails in 3 of 3 games against nobody in red_light: 100" in junit
 
 
