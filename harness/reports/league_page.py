@@ -32,22 +32,22 @@ def render_league(ego: str, table: pd.DataFrame, addresses: Sequence[str], faile
     rows = table.to_dict("records")
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
     shields = sorted({row["shield"] for row in rows})
-    people = sorted({row["person"] for row in rows} - set(UNTRAINED))
-    columns = [each for each in (*UNTRAINED, *people) if each in {row["person"] for row in rows}]
-    cells: dict[tuple[str, str, str], list[FailureCell]] = {}
+    met: dict[tuple[str, str], dict[str, list[FailureCell]]] = {}
     for row, address in zip(rows, addresses, strict=True):
-        cells.setdefault((row["scene"], row["shield"], row["person"]), []).append(_cell(row, address))
+        people = met.setdefault((row["scene"], row["shield"]), {})
+        people.setdefault(row["person"], []).append(_cell(row, address))
     return (
         environment_of("reports")
         .get_template("league.html.jinja")
         .render(
             ego=ego,
             games=int(table["episodes"].sum() - table["errors"].sum()),
-            columns=[person_in_words(each) for each in columns],
+            columns=[person_in_words(each) for each in UNTRAINED],
             lines=[
-                (with_shield(scene, shield), [cells.get((scene, shield, person), []) for person in columns])
+                (with_shield(scene, shield), [of.pop(each, []) for each in UNTRAINED], of)
                 for scene in scenes
                 for shield in shields
+                if (of := met.get((scene, shield)))
             ],
             headings=HEADINGS,
             tones=RISK_TONES,
