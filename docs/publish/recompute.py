@@ -122,14 +122,16 @@ def comparisons(table: pd.DataFrame, games: Games) -> Iterator[Cell]:
         yield f"{where}, pairs", row["pairs"], len(values)
         if len(values):
             yield f"{where}, mean_difference", row["mean_difference"], values.mean()
-        if not math.isnan(row["p_value"]):
+        if not math.isnan(row["t"]):
             t = values.mean() / (values.std() / math.sqrt(len(values)))
             low, high = t_interval(values)
             found = {"ci_low": low, "ci_high": high, "t": t, "p_value": stats.t.sf(t, len(values) - 1)}
             for name, value in found.items():
                 yield f"{where}, {name}", row[name], value
         elif pd.isna(row["reason"]) and len(values) > 1:
-            yield f"{where}, spread without a test", 0.0, values.std()
+            yield f"{where}, spread without a t statistic", 0.0, values.std()
+            if not math.isnan(row["p_value"]):
+                yield f"{where}, p_value", row["p_value"], mcnemar(values, sides=1)
         if not math.isnan(row["mcnemar_p"]):
             yield f"{where}, mcnemar_p", row["mcnemar_p"], mcnemar(values, sides=1)
     for family in ((table["metric"] == "failure"), table["metric"].isin(HARM)):
@@ -237,7 +239,7 @@ def gaps(table: pd.DataFrame, games: Games, cells: pd.DataFrame) -> Iterator[Cel
         yield f"{where}, payoff", row["payoff"], pair.mean()
         yield f"{where}, gap", row["gap"], (best - pair).mean()
         yield f"{where}, search_gap", row["search_gap"], (responses[1] - pair).mean()
-        if not math.isnan(row["p_value"]):
+        if not math.isnan(row["t"]):
             t = (best - pair).mean() / ((best - pair).std() / math.sqrt(len(both)))
             low, high = t_interval(best - pair)
             found = {"ci_low": low, "ci_high": high, "p_value": stats.t.sf(t, len(both) - 1)}
@@ -256,7 +258,7 @@ def generalisation(table: pd.DataFrame, games: Games, cells: pd.DataFrame) -> It
         yield f"{where}, pairs", row["pairs"], len(fewer)
         if len(fewer):
             yield f"{where}, fewer_failures", row["fewer_failures"], fewer.mean()
-        if not math.isnan(row["p_value"]):
+        if not math.isnan(row["t"]):
             t = fewer.mean() / (fewer.std() / math.sqrt(len(fewer)))
             yield f"{where}, p_value", row["p_value"], stats.t.sf(t, len(fewer) - 1)
     for row, value in zip(table.to_dict("records"), holm(table["p_value"].tolist(), len(table)), strict=True):

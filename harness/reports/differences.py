@@ -43,7 +43,6 @@ RELEVANT_SPEED_MPS = 0.25
 """The smallest difference of average speed that counts: just under 1 km/h, the step of a car's speedometer."""
 CHANCE = "the difference can be chance"
 NO_RELEVANT_DIFFERENCE = "no relevant difference"
-NO_T_STATISTIC = "all {pairs} pairs have the same difference, so there is no t statistic"
 
 
 def speed_sentence(row: Row, before: Row, after: Row, significance: float | None) -> str:
@@ -64,7 +63,7 @@ def _speed_finding(row: Row, significance: float | None) -> str:
     if is_equivalent(row):
         return f"{NO_RELEVANT_DIFFERENCE} (less than {RELEVANT_SPEED_MPS:g}{NO_SPACE}m/s)"
     if verdict is Verdict.ALL_EQUAL:
-        return NO_T_STATISTIC.format(pairs=pairs)
+        return f"all {pairs} pairs have the same difference, so there is no t statistic"
     if significance is not None and two_sided_p(row) < significance:
         return "faster" if faster_by(row) > 0 else "slower"
     return CHANCE

@@ -12,7 +12,6 @@ from typing import Any
 
 from harness.evaluation.comparisons.arm_clauses import Beside, by_criterion, harm_clauses, near_misses
 from harness.evaluation.comparisons.comparison import HARM, SHARES
-from harness.evaluation.competence import Verdict
 from harness.evaluation.strategies import Arm, EgoStrategy, PersonaNonEgo
 from harness.game.human_factors import Attention
 from harness.game.roles import NON_EGO
@@ -107,9 +106,7 @@ def _harm(persona: str, tables: RunTables) -> Iterator[KeyFigure]:
     grown = {
         row["metric"]
         for row in tables.tests_of("RQ2", persona)
-        if row["metric"] in HARM & SHARES
-        and row["mean_difference"] > 0.0
-        and (row["rejects_h0"] or row["verdict"] == Verdict.ALL_EQUAL.value)
+        if row["metric"] in HARM & SHARES and row["mean_difference"] > 0.0 and row["rejects_h0"]
     }
     clauses = harm_of(persona, tables)
     lines = sorted(clauses, key=lambda metric: metric in grown)

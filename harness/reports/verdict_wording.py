@@ -14,9 +14,9 @@ import pandas as pd
 
 from harness.evaluation.competence import WITHHELD, Verdict
 from harness.evaluation.planned_tests import LEAST_TRAININGS, PRIMARY, About
-from harness.reports.differences import CHANCE, NO_T_STATISTIC, effect, p_values, speed_sentence, too_few
+from harness.reports.differences import CHANCE, effect, p_values, speed_sentence, too_few
 from harness.reports.human_ranges import declared_unlike
-from harness.reports.numbers import p_text, trimmed
+from harness.reports.numbers import trimmed
 from harness.reports.run_tables import Row, RunTables, failures_of, played
 
 TOO_FEW_TRAININGS = f"trainings like this need {LEAST_TRAININGS} training seeds"
@@ -200,9 +200,6 @@ def _of_seed(tables: RunTables, question: str, persona: str, seed: int) -> Answe
         sentence = as_sentence(failure["reason"])
         return replace(asked, label=LABELS[verdict], sentence=sentence)
     sentence = _failure_sentence(tables, failure, before, after)
-    if verdict is Verdict.ALL_EQUAL and tables.significance is not None:
-        below = "below" if failure["mcnemar_p"] < tables.significance else "not below"
-        sentence += f" This is {below} the campaign's significance of {tables.significance:g} (without correction)."
     told_speed = ""
     if speed is not None:
         told_speed = speed_sentence(speed, before, after, tables.significance)
@@ -244,9 +241,6 @@ def _failure_sentence(tables: RunTables, row: Row, before: Row, after: Row) -> s
             return (
                 f"{counts}. In each of the {pairs} pairs both games have the same result, so there is nothing to test."
             )
-        case Verdict.ALL_EQUAL:
-            test = f"McNemar's exact test gives {p_text(row['mcnemar_p'])}."
-            return f"{counts}; {NO_T_STATISTIC.format(pairs=pairs)}. {test}"
         case _:
             return f"{counts}, {too_few(pairs)}."
 

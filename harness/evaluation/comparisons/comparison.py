@@ -17,7 +17,8 @@ bystander, fails without the ego, and of the follower's strongest braking. Their
 The same row also contains: the two-sided 95 % t interval of the mean difference; the effect
 size (Cohen's d_z, mean / standard deviation of the differences); for failures McNemar's exact test,
 one-tailed in the direction of H1 like the t-test (of the pairs in which exactly one game failed, is H1 right
-in more than half? Binomial with p = 1/2; 1 when there are no such pairs).
+in more than half? Binomial with p = 1/2; 1 when there are no such pairs). Where all pairs differ alike, as in
+100 failures instead of none, there is no t statistic, and the p-value of a share is that of McNemar's test.
 
 Every row is about one trained pair. The t-tests of failures are the primary tests, and Holm's correction is over all
 that the campaign plans (`evaluation.planned_tests`), whatever comes of them: a question that is not answered, not
@@ -75,9 +76,9 @@ def compare(
 
     `episodes` has the columns of episodes.csv: arm, seed, episode, ego_outcome, error, and the metrics'.
     Games are paired by seed and episode. A pair is left out, and counted in `pairs_left_out`, when either
-    game errored, has an empty value, or is missing. A value that can't be computed is NaN. Where all
-    differences are equal, or there are fewer than two pairs, there is no test: t, p-values, interval and effect
-    size are NaN, and `rejects_h0` is false. The same holds for a question whose players miss a bound of
+    game errored, has an empty value, or is missing. A value that can't be computed is NaN. Where all differences are
+    equal, there is no t, interval and effect size. If they are 0, or not of shares, or fewer than two, there is no test
+    either: p-values are NaN, and `rejects_h0` is false. Nor is there one for a question whose players miss a bound of
     `Question.alone`, or whose person is unlike people.
 
     Raises ValueError when an arm has two games for one episode.
@@ -181,6 +182,8 @@ def _row(
     row |= paired_t_test(low, high, closed)
     if not closed["reason"] and metric in SHARES and len(low) >= 2:
         row["mcnemar_p"] = mcnemar(high - low, "greater")
+        if "p_value" not in row and row["mean_difference"] != 0:
+            row["p_value"] = row["mcnemar_p"]
     return row
 
 

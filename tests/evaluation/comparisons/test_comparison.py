@@ -146,14 +146,21 @@ def test_compare__less_than_two_pairs_are_not_enough():
     assert failure["verdict"] == "not enough pairs"
 
 
-def test_compare__equal_differences_that_are_not_zero_have_no_t_and_are_never_significant():
+def test_compare__of_failures_that_differ_alike_in_all_pairs_the_exact_test_counts():
     arms = games("naive_alone", [0] * 10, [20.0] * 10), games("naive_vs_speedy", [1] * 10, [19.0] * 10)
     failure, mean_speed = both_metrics(RQ1, *arms)
     for row in (failure, mean_speed):
         assert row["mean_difference"] == 1
-        assert all(math.isnan(row[name]) for name in ("t", "p_value", "p_holm"))
-        assert (row["rejects_h0"], row["verdict"]) == (False, "no t statistic: all differences equal")
-    assert same(failure["mcnemar_p"], 2.0**-10)  # which does exist
+        assert math.isnan(row["t"])
+    assert all(same(failure[name], 2.0**-10) for name in ("mcnemar_p", "p_value", "p_holm"))
+    assert (failure["rejects_h0"], failure["verdict"]) == (True, "significant")
+    assert math.isnan(mean_speed["p_value"])
+    assert (mean_speed["rejects_h0"], mean_speed["verdict"]) == (False, "no t statistic: all differences equal")
+
+
+def test_compare__failures_that_all_go_the_other_way_are_not_significant():
+    failure, _ = both_metrics(RQ1, games("naive_alone", [1] * 10), games("naive_vs_speedy", [0] * 10))
+    assert (failure["p_value"], failure["verdict"]) == (1.0, "not significant")
 
 
 def test_compare__rounding_errors_are_no_spread():
