@@ -239,7 +239,7 @@ def gaps(table: pd.DataFrame, games: Games, cells: pd.DataFrame) -> Iterator[Cel
         yield f"{where}, payoff", row["payoff"], pair.mean()
         yield f"{where}, gap", row["gap"], (best - pair).mean()
         yield f"{where}, search_gap", row["search_gap"], (responses[1] - pair).mean()
-        if not math.isnan(row["t"]):
+        if not math.isnan(row["p_value"]):
             t = (best - pair).mean() / ((best - pair).std() / math.sqrt(len(both)))
             low, high = t_interval(best - pair)
             found = {"ci_low": low, "ci_high": high, "p_value": stats.t.sf(t, len(both) - 1)}
@@ -258,7 +258,7 @@ def generalisation(table: pd.DataFrame, games: Games, cells: pd.DataFrame) -> It
         yield f"{where}, pairs", row["pairs"], len(fewer)
         if len(fewer):
             yield f"{where}, fewer_failures", row["fewer_failures"], fewer.mean()
-        if not math.isnan(row["t"]):
+        if not math.isnan(row["p_value"]):
             t = fewer.mean() / (fewer.std() / math.sqrt(len(fewer)))
             yield f"{where}, p_value", row["p_value"], stats.t.sf(t, len(fewer) - 1)
     for row, value in zip(table.to_dict("records"), holm(table["p_value"].tolist(), len(table)), strict=True):

@@ -62,6 +62,7 @@ _PAIRS = (
     Column("pairs_left_out", COUNT, "Pairs with a game that errored, is missing or has an empty value."),
 )
 _P = Column("p_value", NUMBER, "Of the paired one-tailed t-test.", unit=P_VALUE, label="p", source=_PAPER)
+_P_SHARES = replace(_P, meaning=f"{_P.meaning} Of McNemar's exact test for failures that differ alike in all pairs.")
 _P_HOLM = Column(
     "p_holm", NUMBER, "Corrected for all rows of the table.", unit=P_VALUE, label="p after Holm", source="Holm 1979"
 )
@@ -218,7 +219,7 @@ _TABLES = {
         Column("ci_low", NUMBER, f"The low end of its {_T}.", unit=OF_METRIC, label="its 95 % low"),
         Column("ci_high", NUMBER, f"The high end of its {_T}.", unit=OF_METRIC, label="its 95 % high"),
         Column("t", NUMBER, "The t statistic; empty where all differences are equal.", source=_PAPER),
-        replace(_P, meaning=f"{_P.meaning} Of shares that differ alike in all pairs: mcnemar_p."),
+        _P_SHARES,
         *(_P_PLANNED, _PLANNED),
         Column("effect_size", NUMBER, "Cohen's d_z: mean over standard deviation.", label="effect size d_z"),
         Column("mcnemar_p", NUMBER, "McNemar's exact test, of shares.", unit=P_VALUE, label="McNemar p"),
@@ -332,7 +333,7 @@ _TABLES = {
         *Column(
             "fewer_failures", NUMBER, "Mean of naive minus this ego; above 0 it fails less.", unit=POINTS
         ).with_interval(_T),
-        *(_P, _P_HOLM, _VERDICT, _REASON),
+        *(_P_SHARES, _P_HOLM, _VERDICT, _REASON),
     ),
     "searches": SEARCHES,
     "falsification": (*FALSIFICATION, _P_LOG_RANK, _P_HOLM, _VERDICT),

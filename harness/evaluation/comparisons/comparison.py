@@ -179,11 +179,7 @@ def _row(
     low, high = (baseline, treatment) if sign[question.question] > 0 else (treatment, baseline)
     low, high = low[:, 0], high[:, 0]
     row = vars(question) | closed | {"metric": metric, "pairs": len(low), "pairs_left_out": left_out}
-    row |= paired_t_test(low, high, closed)
-    if not closed["reason"] and metric in SHARES and len(low) >= 2:
-        row["mcnemar_p"] = mcnemar(high - low, "greater")
-        if "p_value" not in row and row["mean_difference"] != 0:
-            row["p_value"] = row["mcnemar_p"]
+    row |= (paired_share_test if metric in SHARES else paired_t_test)(low, high, closed)
     return row
 
 
@@ -250,6 +246,16 @@ def paired_t_test(low: FloatArray, high: FloatArray, closed: dict[str, str]) -> 
         "p_value": float(test.pvalue),
         "effect_size": mean / float(differences.std(ddof=1)),
     }
+
+
+def paired_share_test(low: FloatArray, high: FloatArray, closed: dict[str, str]) -> dict[str, float]:
+    """`paired_t_test` of values that are 0 or 1, with `mcnemar_p`: the p-value where all pairs differ alike."""
+    cells = paired_t_test(low, high, closed)
+    if not closed["reason"] and len(low) >= 2:
+        cells["mcnemar_p"] = mcnemar(high - low, "greater")
+        if cells["mean_difference"] != 0:
+            cells.setdefault("p_value", cells["mcnemar_p"])
+    return cells
 
 
 def _all_equal(values: FloatArray, largest: float) -> bool:

@@ -15,7 +15,7 @@ from harness.evaluation.comparisons.comparison import (
     holm,
     mean_cells,
     measured_values,
-    paired_t_test,
+    paired_share_test,
     pairs_of,
     rate_cells,
     with_verdicts,
@@ -112,6 +112,6 @@ def _generalised(
     row |= rate_cells("failure_rate", now.sum(), len(now)) | {"naive_failure_rate": was.mean()}
     if was.sum():
         row["share_of_naive"] = now.sum() / was.sum()
-    test = paired_t_test(now, was, closed)
+    test = paired_share_test(now, was, closed)
     names = {"mean_difference": "fewer_failures", "ci_low": "fewer_failures_low", "ci_high": "fewer_failures_high"}
-    return row | {names.get(name, name): cell for name, cell in test.items()}
+    return row | {names.get(name, name): cell for name, cell in test.items() if name != "mcnemar_p"}

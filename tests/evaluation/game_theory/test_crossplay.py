@@ -76,6 +76,14 @@ def test_generalisation__agrees_with_the_arithmetic_on_paper():
     assert row["verdict"] == Verdict.NOT_SIGNIFICANT.value
 
 
+def test_generalisation__of_failures_that_all_vanish_the_exact_test_counts():
+    always, never = [1] * 10, [0] * 10
+    episodes = table(arm("naive_vs_distracted", ego_failed=always), arm("retrained_vs_distracted", ego_failed=never))
+    (row,) = generalisation({"retrained_speedy": ("speedy",)}, BOTH, episodes, 0.01).to_dict("records")
+    assert row["p_value"] == pytest.approx(2.0**-10)
+    assert row["verdict"] == Verdict.SIGNIFICANT.value
+
+
 def test_generalisation__has_only_personas_an_ego_was_not_trained_against():
     found = findings(games=20).generalisation
     assert [tuple(row) for row in found[["ego", "met", "non_ego"]].to_numpy()] == [
