@@ -76,6 +76,7 @@ GAME_MAY_IMPORT = {
     *("itertools", "math", "numpy", "operator", "typing"),
 }
 JIT_MAY_IMPORT = GAME_MAY_IMPORT | {
+    "atexit",
     "contextlib",
     "filelock",
     "logging",

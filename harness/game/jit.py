@@ -5,6 +5,7 @@ Floating-point operations keep the order of the source (no "fast math"): results
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import hashlib
 import logging
@@ -85,6 +86,9 @@ def _lock(folder: Path, process: int) -> contextlib.AbstractContextManager[objec
 
     folder.mkdir(parents=True, exist_ok=True)
     return FileLock(folder / "turn", fallback_to_soft=False)
+
+
+atexit.register(_lock.cache_clear)  # a lock that is left until the modules are gone complains of it
 
 
 @cache
