@@ -62,7 +62,7 @@ _PAIRS = (
     Column("pairs_left_out", COUNT, "Pairs with a game that errored, is missing or has an empty value."),
 )
 _P = Column("p_value", NUMBER, "Of the paired one-tailed t-test.", unit=P_VALUE, label="p", source=_PAPER)
-_P_SHARES = replace(_P, meaning=f"{_P.meaning} Of McNemar's exact test for failures that differ alike in all pairs.")
+_P_SHARES = replace(_P, meaning=f"{_P.meaning} Where shares differ alike in all pairs: of McNemar's exact test.")
 _P_HOLM = Column(
     "p_holm", NUMBER, "Corrected for all rows of the table.", unit=P_VALUE, label="p after Holm", source="Holm 1979"
 )
@@ -308,8 +308,7 @@ _TABLES = {
         *(_VERDICT, _REASON),
     ),
     "crossplay": (
-        *(SEED, *_STRATEGIES),
-        *(PERSONA, ARM),
+        *(SEED, *_STRATEGIES, PERSONA, ARM),
         Column("games", COUNT, "Games that were played and measured."),
         Column("left_out", COUNT, "Episodes of this seed that were not played, not measured, or are missing."),
         *rate("failure_rate", _FAILED),

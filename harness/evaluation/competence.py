@@ -65,7 +65,7 @@ class Verdict(str, Enum):
     NO_DIFFERENCE = "no difference"
     """Every difference is 0, so there is no t statistic."""
     ALL_EQUAL = "no t statistic: all differences equal"
-    """Every difference is the same number, not 0, of a quantity that is no share of games, or over trainings."""
+    """Every difference is the same number, not 0: of speeds or braking, or of failures over trainings."""
     NOT_ENOUGH_PAIRS = "not enough pairs"
     """Fewer than two pairs could be compared."""
     NOT_ENOUGH_TRAININGS = "not enough trainings"

@@ -88,7 +88,7 @@ def _lock(folder: Path, process: int) -> contextlib.AbstractContextManager[objec
     return FileLock(folder / "turn", fallback_to_soft=False)
 
 
-atexit.register(_lock.cache_clear)  # a lock that is left until the modules are gone complains of it
+atexit.register(_lock.cache_clear)  # filelock prints an error for a lock that outlives its modules
 
 
 @cache

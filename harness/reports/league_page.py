@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
@@ -44,10 +45,9 @@ def render_league(ego: str, table: pd.DataFrame, addresses: Sequence[str], faile
             games=int(table["episodes"].sum() - table["errors"].sum()),
             columns=[person_in_words(each) for each in UNTRAINED],
             lines=[
-                (with_shield(scene, shield), [of.pop(each, []) for each in UNTRAINED], of)
-                for scene in scenes
-                for shield in shields
-                if (of := met.get((scene, shield)))
+                (with_shield(*line), [met[line].get(each, []) for each in UNTRAINED], _people(met[line]))
+                for line in product(scenes, shields)
+                if line in met
             ],
             headings=HEADINGS,
             tones=RISK_TONES,
@@ -56,6 +56,11 @@ def render_league(ego: str, table: pd.DataFrame, addresses: Sequence[str], faile
             not_answered=dict.fromkeys((row["scene"], row["reason"]) for row in rows if row["reason"]),
         )
     )
+
+
+def _people(met: Mapping[str, list[FailureCell]]) -> dict[str, list[FailureCell]]:
+    """The cells of the people among those that the ego meets in a scene, by person."""
+    return {person: cells for person, cells in met.items() if person not in UNTRAINED}
 
 
 def league_terminal(table: pd.DataFrame) -> Table:

@@ -22,7 +22,7 @@ in more than half? Binomial with p = 1/2; 1 when there are no such pairs). Where
 
 Every row is about one trained pair. The t-tests of failures are the primary tests, and Holm's correction is over all
 that the campaign plans (`evaluation.planned_tests`), whatever comes of them: a question that is not answered, not
-played or has no t statistic counts as a test with p = 1. Tests of the average speed are secondary and not corrected.
+played or shows no difference counts as a test with p = 1. Tests of the average speed are secondary and not corrected.
 Those of harm to others are secondary, and a family of their own.
 
 A question whose players were not shown to drive the scene alone, or whose person does not drive as people do
@@ -77,9 +77,9 @@ def compare(
     `episodes` has the columns of episodes.csv: arm, seed, episode, ego_outcome, error, and the metrics'.
     Games are paired by seed and episode. A pair is left out, and counted in `pairs_left_out`, when either
     game errored, has an empty value, or is missing. A value that can't be computed is NaN. Where all differences are
-    equal, there is no t, interval and effect size. If they are 0, or not of shares, or fewer than two, there is no test
-    either: p-values are NaN, and `rejects_h0` is false. Nor is there one for a question whose players miss a bound of
-    `Question.alone`, or whose person is unlike people.
+    equal, t, interval and effect size are NaN. The p-value is then that of McNemar's test, if they are of shares and
+    not 0; otherwise it is NaN, and `rejects_h0` is false. All of these are NaN for fewer than two pairs, and for a
+    question whose players miss a bound of `Question.alone`, or whose person is unlike people.
 
     Raises ValueError when an arm has two games for one episode.
     """
@@ -179,8 +179,7 @@ def _row(
     low, high = (baseline, treatment) if sign[question.question] > 0 else (treatment, baseline)
     low, high = low[:, 0], high[:, 0]
     row = vars(question) | closed | {"metric": metric, "pairs": len(low), "pairs_left_out": left_out}
-    row |= (paired_share_test if metric in SHARES else paired_t_test)(low, high, closed)
-    return row
+    return row | (paired_share_test if metric in SHARES else paired_t_test)(low, high, closed)
 
 
 def games_by_arm(episodes: pd.DataFrame) -> Mapping[Any, pd.DataFrame]:
