@@ -10,6 +10,7 @@ A campaign continues where it was interrupted, and a finished one is not run aga
 from __future__ import annotations
 
 import gzip
+import json
 import shutil
 import subprocess
 import sys
@@ -23,6 +24,7 @@ from pydantic import Field, model_validator
 
 from harness.config.toml_reading import Document, read_document
 from harness.errors import NOT_ACCEPTED
+from harness.evaluation.strategies import ManyPersonas, strategy_name
 from harness.files import write_atomically
 
 ROOT = Path(__file__).parents[2]
@@ -37,10 +39,10 @@ class Step(Document):
     campaign: str = ""
     pack: bool = False
     """Whether the long tables of the campaign's run folder are published, compressed."""
+    people: str = ""
+    """The folder into which the policies of the campaign's personas are copied, for `harness league`."""
     copy_from: str = Field("", alias="copy")
     to: str = ""
-    without: list[str] = Field(default_factory=list)
-    """Names that are not copied, such as `retrained_*`."""
     command: str = ""
     cost: str = ""
     """The cost of a command, in words."""
@@ -51,10 +53,8 @@ class Step(Document):
             raise ValueError("a step has one of `campaign`, `copy` and `command`")
         if bool(self.copy_from) != bool(self.to):
             raise ValueError("`copy` and `to` belong together")
-        if self.without and not self.copy_from:
-            raise ValueError("`without` belongs to `copy`")
-        if self.pack and not self.campaign:
-            raise ValueError("`pack` belongs to a campaign")
+        if (self.pack or self.people) and not self.campaign:
+            raise ValueError("`pack` and `people` belong to a campaign")
         return self
 
     def __str__(self) -> str:
@@ -96,21 +96,34 @@ def main(
 def carry_out(step: Step, root: Path) -> None:
     """Carry out one step in a checkout. Raises CalledProcessError or OSError if it fails."""
     if step.campaign:
+        run = root / "reports" / Path(step.campaign).stem
         _run(f"harness campaign {step.campaign}", root, capture=False)
         if step.pack:
-            pack(root / "reports" / Path(step.campaign).stem)
+            pack(run)
+        if step.people:
+            _replace(root / step.people, people_of(run))
     elif step.command:
         _run(step.command, root, capture=False)
     else:
-        source, target = root / step.copy_from, root / step.to
-        if source.is_dir():
-            fresh = target.with_name(f"{target.name}.new")
-            shutil.rmtree(fresh, ignore_errors=True)
-            shutil.copytree(source, fresh, ignore=shutil.ignore_patterns(*step.without))
-            shutil.rmtree(target, ignore_errors=True)
-            fresh.rename(target)
-        else:
-            write_atomically(target, source.read_bytes())
+        _replace(root / step.to, sorted((root / step.copy_from).iterdir()))
+
+
+def people_of(run: Path) -> list[Path]:
+    """The policies of a run's personas: the network of all of them for each seed, if they learned together."""
+    policies = run / "policies"
+    together = sorted(policies.glob(f"{strategy_name(ManyPersonas(personas=()))}-seed*"))
+    personas = json.loads((run / "manifest.json").read_bytes())["personas"]
+    return together or [each for name in personas for each in sorted(policies.glob(f"{name}-seed*"))]
+
+
+def _replace(target: Path, sources: list[Path]) -> None:
+    """Replace a folder by copies of other folders."""
+    fresh = target.with_name(f"{target.name}.new")
+    shutil.rmtree(fresh, ignore_errors=True)
+    for each in sources:
+        shutil.copytree(each, fresh / each.name)
+    shutil.rmtree(target, ignore_errors=True)
+    fresh.rename(target)
 
 
 def pack(run: Path) -> None:
