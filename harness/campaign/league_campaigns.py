@@ -4,9 +4,8 @@
     <folder>/egos/<name>.toml         the ego's document, without the parameters that a search may change
     <folder>/<scene>/                 its run folder
 
-The people of a scene are the policies in `policies/<scene>/` of players other than the ego, one for each person or one
-of several persons (`drivers.policy_of_many`). People of other training seeds than the first ones, and those of another
-kind of policy, have a campaign of their own, `<scene>-seed<n>`.
+People of other training seeds than the first ones, and those of another kind of policy, have a campaign of their own,
+`<scene>-seed<n>`.
 """
 
 from __future__ import annotations
@@ -15,7 +14,6 @@ import os
 import shlex
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -23,21 +21,18 @@ from typing import Any
 import tomli_w
 
 from harness.campaign.preflight import OpenCampaign, open_campaign
+from harness.campaign.shipped_people import SEED, people_of
 from harness.config.campaign import LEARNED, SUMO
 from harness.config.driver import DriverDocument, Onnx, Process, StableBaselines3, TorchScript
 from harness.config.tunable import Adjustable
 from harness.drivers.external import find_driver
-from harness.drivers.policy_file import read_card
-from harness.drivers.policy_of_many import personas_in
 from harness.drivers.sb3_policy import saved_by
 from harness.errors import Problem, UsageError, collect
 from harness.files import make_folder, write_atomically
-from harness.game.roles import EGO, ROLES
 from harness.shipped_documents import find_document, missing_document, shipped, shipped_names
 
 _CAMPAIGNS, _EGOS = "campaigns", "egos"
 _OPTION = "--ego"
-_SEED = "-seed"
 
 
 def open_league(
@@ -77,36 +72,6 @@ def name_of(ego: str) -> str:
     return Path(ego if os.path.exists(ego) else shlex.split(ego)[0]).stem
 
 
-@dataclass(frozen=True, kw_only=True)
-class People:
-    """Persons of a scene who learned with the same training seeds."""
-
-    personas: list[str]
-    seeds: list[int]
-    together: bool
-    """Whether there is one policy of all of them for each seed."""
-
-
-def people_of(scene: Path) -> list[People]:
-    """The shipped people of a scene."""
-    seeds: dict[tuple[str, bool], list[int]] = {}
-    folder = shipped("policies") / scene.name
-    if scene == shipped("networks").resolve() / scene.name and folder.is_dir():
-        for policy in sorted(folder.iterdir()):
-            name, _, seed = policy.name.rpartition(_SEED)
-            if name and seed.isdecimal() and policy.is_dir():
-                card = read_card(policy)
-                several = personas_in(card)
-                for person in several or ([name] if card.get("player") != ROLES[EGO] else []):
-                    seeds.setdefault((person, bool(several)), []).append(int(seed))
-    groups: dict[tuple[tuple[int, ...], bool], list[str]] = {}
-    for (person, together), of_person in seeds.items():
-        groups.setdefault((tuple(sorted(of_person)), together), []).append(person)
-    return [
-        People(personas=personas, seeds=list(own), together=together) for (own, together), personas in groups.items()
-    ]
-
-
 def _scene_at(written: str) -> Path:
     place = find_document(written, Path(), "networks")
     if not place.is_dir():
@@ -120,7 +85,7 @@ def _campaigns(scene: Path, ego: Mapping[str, str], episodes: int) -> Iterator[M
     if not people:
         yield {"name": scene.name, "personas": [], **shared}
     for number, each in enumerate(people):
-        name = f"{scene.name}{_SEED}{'-'.join(map(str, each.seeds))}" if number else scene.name
+        name = f"{scene.name}{SEED}{'-'.join(map(str, each.seeds))}" if number else scene.name
         own = {"personas": each.personas, "seeds": each.seeds, "policies": str(shipped("policies") / scene.name)}
         how = {"non_ego_training": {"together": True}} if each.together else {}
         yield {"name": name, **own, **how, **shared}

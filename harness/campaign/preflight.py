@@ -11,18 +11,18 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from harness.campaign.plan.campaign_checks import check_names, check_people, check_roads
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import Stage
 from harness.campaign.plan.strategy_stages import crossplay_name
+from harness.campaign.shipped_people import ShippedPerson, shipped_people
 from harness.campaign.trained_policies import check_policies, find_policies
-from harness.config.campaign import LEARNED, SUMO, Campaign
+from harness.config.campaign import LEARNED, SHIPPED, SUMO, Campaign
 from harness.config.campaign_names import CampaignNames
 from harness.config.ego_perception import EgoPerception
 from harness.config.persona import Persona
-from harness.config.toml_reading import D, read_document
+from harness.config.toml_reading import D, Document, read_document
 from harness.config.traits import traits_of
 from harness.drivers import driver_files, policy_origin
 from harness.drivers.car import car_of
@@ -49,6 +49,8 @@ class OpenCampaign:
     scene: OpenScene
     roads: tuple[OpenScene, ...]
     """The scenes on whose roads the egos learn too."""
+    shipped: Mapping[str, tuple[ShippedPerson, ...]]
+    """The shipped people of these scenes, by the scene's name, where the ego is retrained against them."""
     ego_persona: Persona
     personas: tuple[Persona, ...]
     baseline: Persona | None
@@ -159,6 +161,7 @@ def open_campaign(
     check_people(file, document, len(scene.document.non_ego))
     check_roads(file, document, [_game_of(each) == _game_of(scene) for each in opened])
     check_names(file, document, names, tunable, traits)
+    shipped = _shipped_people(file, document, (scene, *opened))
     files, policy_drivers = list[Path](), dict[str, ExternalDriver]()
     if policies is not None and policies_exist:
         files, policy_drivers = check_policies(
@@ -173,7 +176,8 @@ def open_campaign(
             elsewhere=elsewhere,
         )
     scene_files = (each.folder / name for each in (scene, *opened) for name in each.document.files)
-    files = [file, *files, *named_files, *scene_files]
+    shipped_files = (each for of_scene in shipped.values() for person in of_scene for each in person.files)
+    files = [file, *files, *named_files, *scene_files, *shipped_files]
     for external in (ego_driver, *other_egos.values()):
         files += map(Path, external.files if external is not None else ())
     quick = quick and (policies is None or tunable)
@@ -183,6 +187,7 @@ def open_campaign(
         quick=quick,
         scene=scene,
         roads=tuple(opened),
+        shipped=shipped,
         ego_persona=ego_persona,
         personas=tuple(read),
         baseline=baseline,
@@ -212,7 +217,7 @@ def _open_named(file: Path, key: str, written: str, vehicle_type: str | None = N
     return open_scene(named_document(written, "networks", file, key), vehicle_type)
 
 
-def _game_of(scene: OpenScene) -> tuple[Any, ...]:
+def _game_of(scene: OpenScene) -> tuple[object, ...]:
     """What all roads of a campaign have in common."""
     return scene.world.roles, scene.world.walks.tolist(), scene.world.step_s
 
@@ -223,6 +228,20 @@ def _read_named(file: Path, key: str, written: str, kind: Kind, form: type[D], f
     document = read_document(path, form)
     files.append(path)
     return document
+
+
+def _shipped_people(
+    file: Path, document: Campaign, scenes: Sequence[OpenScene]
+) -> dict[str, tuple[ShippedPerson, ...]]:
+    """The shipped people of each of these scenes that has some, where the ego is retrained against them. Raises
+    UsageError if none has."""
+    if SHIPPED not in document.retraining.against:
+        return {}
+    found = {each.document.name: people for each in scenes if (people := shipped_people(each.folder))}
+    if not found:
+        message = f"{SHIPPED!r}: no people are shipped for the scene, nor for one of `roads`"
+        raise UsageError.of(file, "retraining.against", message, "name personas, or a shipped scene with people")
+    return found
 
 
 def _relative(campaign_file: Path, path: Path) -> str:
@@ -304,7 +323,7 @@ def _quickened(document: Campaign) -> Campaign:
         "steps": min(training.steps, QUICK_STEPS),
         "segment_steps": min(training.segment_steps, QUICK_SEGMENT_STEPS),
     }
-    changes: dict[str, Any] = {
+    changes: dict[str, Document] = {
         "training": training.model_copy(update=steps),
         "reconfiguration": search.model_copy(update={"trials": min(search.trials, QUICK_TRIALS)}),
     }

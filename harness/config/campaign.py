@@ -16,6 +16,7 @@ from harness.game.perception_errors import PerceptionErrors
 from harness.game.roles import MOST_PEOPLE
 
 LEARNED, SUMO = "learned", "sumo"  # drivers of an ego that have a name
+SHIPPED = "shipped"  # in `retraining.against`: the people of the scene
 TRAINING_TABLES = ("training", "naive_training", "non_ego_training", "retraining")
 
 Seed = Annotated[int, Field(ge=0, lt=2**31)]

@@ -111,9 +111,11 @@ class Retraining(Document):
     """Starts of the games against the non-ego. `uniform`: drawn from the scene's ranges. `regret`: half of them are
     replays of starts in which the ego earns less than a reference driver or the naive ego did."""
     against: list[Name] = Field([], max_length=50)
-    """Names of personas, or `sumo`: SUMO's own driver. One more ego, `robust`, is retrained against all of them, in
-    equal shares of its games, and with a budget multiplied by their number. It is also assessed against the other
-    personas of the campaign, which it has not met in training."""
+    """Names of personas; `sumo`: SUMO's own driver; `shipped`: the shipped people of the scene, and of each of `roads`.
+    One more ego, `robust`, is retrained against all of them, in equal shares of its games, and with a budget multiplied
+    by the number of names. It is also assessed against the other personas of the campaign, which it has not met in
+    training. Of the shipped people, one training of each is left out: the first of them for the first of `seeds`, and
+    so on. Where a scene has none, the others have their games, or SUMO's driver."""
 
 
 class Reconfiguration(Document):

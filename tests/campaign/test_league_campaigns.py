@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from harness.campaign import league_campaigns
-from harness.campaign.league_campaigns import People, name_of, open_league, people_of
+from harness.campaign import league_campaigns, shipped_people
+from harness.campaign.league_campaigns import name_of, open_league
+from harness.campaign.shipped_people import People, people_of
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.policy_file import Policy, write_policy
@@ -48,7 +49,7 @@ def test_people__are_discovered_by_their_seeds(tmp_path: Path, monkeypatch: pyte
     shutil.copytree(shipped("policies") / "paper_merge", policies)
     (policies / "paper_speedy-seed11").rename(policies / "paper_speedy-seed12")
     real = shipped
-    monkeypatch.setattr(league_campaigns, "shipped", lambda kind: policies.parent if kind == "policies" else real(kind))
+    monkeypatch.setattr(shipped_people, "shipped", lambda kind: policies.parent if kind == "policies" else real(kind))
     scene = real("networks").resolve() / "paper_merge"
     assert [(each.personas, each.seeds) for each in people_of(scene)] == [
         (["paper_distracted"], [11]),
@@ -64,7 +65,7 @@ def test_people__of_a_policy_of_several_are_found_in_its_card(tmp_path: Path, mo
     for seed in (3, 4):
         write_policy(Policy(some_policy().tensors, card_of_many(personas)), policies / f"people-seed{seed}")
     real = shipped
-    monkeypatch.setattr(league_campaigns, "shipped", lambda kind: policies.parent if kind == "policies" else real(kind))
+    monkeypatch.setattr(shipped_people, "shipped", lambda kind: policies.parent if kind == "policies" else real(kind))
     scene = real("networks").resolve() / "paper_merge"
     assert people_of(scene) == [People(personas=["speedy", "texting"], seeds=[3, 4], together=True)]
     (campaign,) = league_campaigns._campaigns(scene, {"driver": "sumo"}, 2)

@@ -143,6 +143,19 @@ def test_open_campaign__roads_on_which_no_ego_can_learn_are_refused(
     assert words in f"{problem.message}; {problem.remedy}"
 
 
+def test_open_campaign__shipped_people_are_those_of_the_scene_and_of_its_roads(tmp_path: Path) -> None:
+    asked = {"scene": "brake", "retraining": {"against": ["sumo", "shipped"]}, "personas": []}
+    (problem,) = problems_of(write_campaign(tmp_path, **asked))
+    assert problem.key == "retraining.against"
+    assert "no people are shipped" in problem.message
+    campaign = open_campaign(write_campaign(tmp_path, roads=["merge", "cut_in"], **asked))
+    assert {name: sorted({each.persona.name for each in people}) for name, people in campaign.shipped.items()} == {
+        "merge": ["careful", "cautious", "drowsy", "impaired", "late_merger", "speedy", "tailgater", "texting"],
+        "cut_in": ["impatient", "speedy"],
+    }
+    assert any(name.endswith("cut_in/impatient-seed21/policy.safetensors") for name in campaign.hashes)
+
+
 def test_open_campaign__perception_errors_need_an_ego_that_decides(tmp_path: Path) -> None:
     (tmp_path / "krauss.toml").write_text('kind = "sumo"\nvehicle_type = "ego_car"\n', encoding="utf-8")
     ego = {"driver": "krauss.toml", "persona": str(CAREFUL), "perception": "radar_camera"}

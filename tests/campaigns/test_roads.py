@@ -17,7 +17,7 @@ from harness.game.roles import EGO, NON_EGO
 from harness.road.scene.open_scene import open_scene
 from harness.training.training_games import LearningPlace, open_games
 from tests.support.rollouts import Steady
-from tests.support.tiny import CAREFUL, PAPER_MERGE, finished
+from tests.support.tiny import CAREFUL, PAPER_MERGE, TRAINING, finished
 from tests.support.trainings import naive_ego
 
 NAMES = ("naive", "speedy", "retrained_speedy")
@@ -38,6 +38,21 @@ def test_campaign__its_egos_learn_on_other_roads_and_its_people_do_not() -> None
     )
     hashes = json.loads((run / "manifest.json").read_text())["hashes"]
     assert "merge.net.xml" in {Path(each).name for each in hashes}
+
+
+@pytest.mark.slow
+def test_campaign__its_robust_ego_meets_the_shipped_people_of_each_road() -> None:
+    """A road without shipped people has SUMO's driver alone."""
+    against = {"retraining": {"against": ["sumo", "shipped"]}, "personas": []}
+    run = finished(name="shipped", roads=[str(MERGE), "brake"], assessment={"episodes": 2}, **against)
+    card = json.loads((run / "policies" / "robust-seed1" / "policy.json").read_text())
+    assert card["roads"] == ["merge", "brake"]
+    assert card["against"] == "one in each game of sumo, the shipped people of the scene"
+    assert card["training"]["steps"] == 2 * TRAINING["steps"]
+    text = (run / "policies" / "robust-seed1" / "README.md").read_text()
+    assert "The ego, retrained against several drivers, one of them in each game." in text
+    hashes = json.loads((run / "manifest.json").read_text())["hashes"]
+    assert any(each.endswith("policies/paper_merge/paper_speedy-seed11/policy.safetensors") for each in hashes)
 
 
 def test_games__beside_sumos_driver_too__are_in_parts_by_share_and_only_sumos_driver_is_left_to_sumo() -> None:

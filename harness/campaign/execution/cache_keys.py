@@ -10,7 +10,15 @@ from collections.abc import Sequence
 from typing import Any
 
 from harness.assessment.continuation import Continuation
-from harness.campaign.plan.planned_drivers import BestOf, External, Shielded, borrowed_of, members_of, persona_of
+from harness.campaign.plan.planned_drivers import (
+    BestOf,
+    External,
+    Shielded,
+    Shipped,
+    borrowed_of,
+    members_of,
+    persona_of,
+)
 from harness.campaign.plan.stages import (
     AssessmentStage,
     ConditioningStage,
@@ -59,6 +67,9 @@ def _inputs(campaign: OpenCampaign, stage: Stage) -> dict[str, Any]:
             inputs["training"] = training_settings(document, stage).record()
             if stage.learns_on_roads and campaign.roads:
                 inputs["roads"] = [campaign.hashes_of(each) for each in campaign.roads]
+            if any(isinstance(each, Shipped) for each in players):
+                files = {name: [file for each in of for file in each.files] for name, of in campaign.shipped.items()}
+                inputs["shipped"] = {name: [campaign.hash_of(file) for file in each] for name, each in files.items()}
             if stage.best_known is not None:
                 inputs["regret"] = {"best_known": repr(stage.best_known), "references": reference_identity()}
         case ConditioningStage():

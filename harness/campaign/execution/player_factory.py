@@ -21,13 +21,16 @@ from harness.campaign.plan.planned_drivers import (
     PlannedMember,
     Reconfigured,
     Shielded,
+    Shipped,
     Side,
     SumoDriven,
     Trained,
     TrainedBefore,
     borrowed_of,
+    by_control,
     driver_in,
     persona_of,
+    without_shipped,
 )
 from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.trained_policies import DRIVER
@@ -116,14 +119,24 @@ class PlayerFactory:
         assert self.context.policies is not None
         return self.context.policies / planned.stage
 
+    def sides(self, opponent: Side) -> list[tuple[tuple[Mixture | None, ...], float]]:
+        """An opponent of the ego as it plays in this scene: one or two sides, of which the harness drives all members
+        or SUMO does, each with its share of the games. The drivers in each place are made anew."""
+        has_people = self.scene.document.name in self.context.shipped
+        sides = by_control(opponent if has_people else without_shipped(opponent))
+        total = sum(share for _, share in sides)
+        return [(self.people(side), share / total) for side, share in sides]
+
     def _mixture(self, members: tuple[PlannedMember, ...], shares: tuple[float, ...]) -> Mixture:
-        return Mixture(
-            tuple(
-                Member(driver=self.driver(each), persona=self.persona(each), share=share)
-                for each, share in zip(members, shares, strict=True)
-                if share > _LEAST_SHARE
-            )
-        )
+        found = list[Member]()
+        for each, share in zip(members, shares, strict=True):
+            if isinstance(each, Shipped):
+                people = self.context.shipped[self.scene.document.name]
+                for person in people:
+                    found += person.members(each.without, share / len(people))
+            elif share > _LEAST_SHARE:
+                found.append(Member(driver=self.driver(each), persona=self.persona(each), share=share))
+        return Mixture(tuple(found))
 
     def persona(self, planned: PlannedMember) -> Persona:
         """The persona with which a driver drives, with the trait that it borrows."""
@@ -150,5 +163,7 @@ class PlayerFactory:
             case TrainedBefore(stage=stage) if stage in self.context.policy_drivers:
                 car = car_of(self.scene.world, EGO + 1 if persona_of(planned) else EGO)
                 return self.context.policy_drivers[stage].make(car, sampled)
+            case Shipped():
+                raise TypeError("are several drivers")
             case Trained() | TrainedBefore():
                 return LearnedDriver(read_policy(self.policy_folder(planned)), sampled)

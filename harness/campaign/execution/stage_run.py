@@ -22,6 +22,7 @@ from typing import Any, Literal, TypeAlias
 from harness.campaign.plan.planned_drivers import External
 from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage, plays_with_errors
 from harness.campaign.preflight import OpenCampaign
+from harness.campaign.shipped_people import ShippedPerson
 from harness.campaign.storage.checksums import checksums_of, digest_of
 from harness.campaign.storage.locks import held_by_worker
 from harness.campaign.storage.run_folder import RunFolder
@@ -55,6 +56,9 @@ class RunContext:
     other_egos: Mapping[str, ExternalDriver] = field(default_factory=dict)
     roads: tuple[Path, ...] = ()
     """The folders of the scenes on whose roads the egos learn too."""
+    shipped: Mapping[str, tuple[ShippedPerson, ...]] = field(default_factory=dict)
+    """The shipped people of the scene and the roads, by the name of the scene, where the ego is retrained against
+    them."""
     policies: Path | None = None
     """The folder of the policies that another run trained."""
     policy_drivers: Mapping[str, ExternalDriver] = field(default_factory=dict)
@@ -112,6 +116,7 @@ def run_context_of(
         ego_driver=campaign.ego_driver,
         other_egos=campaign.other_egos,
         roads=tuple(each.folder for each in campaign.roads),
+        shipped=campaign.shipped,
         policies=campaign.policies,
         policy_drivers=campaign.policy_drivers,
         keys=keys,

@@ -11,7 +11,7 @@ import pandas as pd
 
 from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import StageRun
-from harness.campaign.plan.planned_drivers import SumoDriven, by_control, description, driver_in
+from harness.campaign.plan.planned_drivers import SumoDriven, description, driver_in
 from harness.campaign.plan.stages import TrainingStage
 from harness.campaign.plan.strategy_stages import training_settings
 from harness.campaign.storage.training_curves import CHECKPOINT
@@ -85,10 +85,9 @@ def _places(stage: TrainingStage, players: PlayerFactory) -> tuple[LearningPlace
     well. A person learns in every place of the non-egos in turn: the other places are driven by SUMO, which no persona
     has trained."""
     if stage.learner == EGO:
-        sides = ((players.people(side), share) for side, share in by_control(stage.opponent))
         return tuple(
             LearningPlace(scene=players.scene, player=EGO, drivers=(None, *people), share=share)
-            for people, share in sides
+            for people, share in players.sides(stage.opponent)
         )
     places = []
     for learner in range(1, len(players.scene.world.roles)):
@@ -110,7 +109,8 @@ def _persona_card(personas: tuple[Persona, ...]) -> dict[str, Any]:
 
 
 def _policy_card(stage: TrainingStage, spec: TrainingSpec) -> dict[str, Any]:
-    roads = [each.scene.document.name for each in spec.places if each.scene is not spec.scene]
+    names = dict.fromkeys(each.scene.document.name for each in spec.places)  # a road may have two places
+    roads = [name for name in names if name != spec.scene.document.name]
     return {
         "stage": stage.id,
         "player": ROLES[stage.learner],

@@ -9,7 +9,7 @@ from typing import TypeAlias
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.plan.strategy_stages import crossplay_name
-from harness.config.campaign import LEARNED, SUMO, Campaign, Rounds
+from harness.config.campaign import LEARNED, SHIPPED, SUMO, Campaign, Rounds
 from harness.config.toml_reading import nearest
 from harness.config.training import Retraining
 from harness.config.traits import UNREAD, PersonTraits
@@ -79,7 +79,7 @@ def _roads(document: Campaign, alike: Sequence[bool]) -> _Found:
     for written, is_alike in zip(document.roads, alike, strict=True):
         if not is_alike:
             message = f"{written!r}: its players, or the length of its steps, are not those of the scene"
-            yield "roads", message, "name scenes that `harness scene vary` made of this one"
+            yield "roads", message, "name scenes with the same players, as `harness scene vary` makes of this one"
 
 
 def _places(document: Campaign, people: int) -> _Found:
@@ -102,7 +102,7 @@ def _personas(document: Campaign, personas: Sequence[str], traits: PersonTraits)
     named |= {f"crowd[{k}].personas": list(dict.fromkeys(each.personas)) for k, each in enumerate(document.crowd)}
     named |= {"retraining.against": document.retraining.against, "rounds.personas": document.rounds.personas}
     for key, names in named.items():
-        known = [*personas, SUMO] if key == "retraining.against" else personas
+        known = [*personas, SUMO, SHIPPED] if key == "retraining.against" else personas
         for name in names:
             if name not in known:
                 yield key, f"there is no persona {name!r}", nearest(name, known)

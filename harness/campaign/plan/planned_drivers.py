@@ -56,6 +56,14 @@ class TrainedBefore:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Shipped:
+    """The shipped people of the scene that is played, one of them in each game."""
+
+    without: int
+    """The number of a training that is left out of those of each person, counted from the first again."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class FixedMixture:
     """One of several drivers in each game, drawn by fixed shares."""
 
@@ -88,8 +96,8 @@ class Shielded:
     rule: Literal["rss"]
 
 
-PlannedMember = SumoDriven | External | Reconfigured | Trained | TrainedBefore
-"""One driver, the same in every game."""
+PlannedMember = SumoDriven | External | Reconfigured | Trained | TrainedBefore | Shipped
+"""One driver, the same in every game, or the people of a scene."""
 PlannedDriver = PlannedMember | FixedMixture | EquilibriumMixture | BestOf | Shielded
 Side: TypeAlias = tuple[PlannedDriver, ...]
 """The drivers of a side: those of the non-egos' places in their order, from the first again where there are more places
@@ -99,6 +107,24 @@ than drivers. Empty: the side takes no part."""
 def driver_in(side: Side, place: int) -> PlannedDriver | None:
     """The driver of a side in one of its places; None: no one."""
     return side[place % len(side)] if side else None
+
+
+def without_shipped(side: Side) -> Side:
+    """A side in a scene that has no shipped people: the others, or SUMO's driver, have their games."""
+    return tuple(map(_without_shipped, side))
+
+
+def _without_shipped(driver: PlannedDriver) -> PlannedDriver:
+    match driver:
+        case Shipped():
+            return SumoDriven()
+        case FixedMixture(members=members, shares=shares):
+            left = [pair for pair in zip(members, shares, strict=True) if not isinstance(pair[0], Shipped)]
+            if len(left) == 1:
+                return left[0][0]
+            return FixedMixture(members=tuple(each for each, _ in left), shares=tuple(share for _, share in left))
+        case _:
+            return driver
 
 
 def by_control(side: Side) -> tuple[tuple[Side, float], ...]:
@@ -146,6 +172,8 @@ def description(driver: PlannedDriver) -> str:
             return name or "given"
         case Reconfigured(stage=stage) | Trained(stage=stage) | TrainedBefore(stage=stage):
             return stage
+        case Shipped():
+            return "the shipped people of the scene"
         case BestOf():
             return "best"
         case Shielded(members=(member,)):

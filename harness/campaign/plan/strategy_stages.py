@@ -14,6 +14,7 @@ from harness.campaign.plan.planned_drivers import (
     PlannedDriver,
     PlannedMember,
     Reconfigured,
+    Shipped,
     Side,
     SumoDriven,
     Trained,
@@ -22,7 +23,7 @@ from harness.campaign.plan.planned_drivers import (
     persona_of,
 )
 from harness.campaign.plan.stages import AssessmentStage, ConditioningStage, Gate, TrainingStage, stage_id
-from harness.config.campaign import LEARNED, SUMO, Campaign
+from harness.config.campaign import LEARNED, SHIPPED, SUMO, Campaign
 from harness.config.training import ATTENTIVE_SHARE, Training
 from harness.config.traits import PAYOFF, UNREAD, PersonTraits
 from harness.evaluation.strategies import (
@@ -86,10 +87,14 @@ class SeedStages:
                 return (self._driver(strategy),)
 
     def mixture(self, shares: Mapping[str, float]) -> PlannedDriver:
-        """Personas, or `sumo`, by their shares, one of which is drawn for each game; of one persona, its driver."""
-        people = (SumoNonEgo() if name == SUMO else PersonaNonEgo(persona=name) for name in shares)
-        members = tuple(map(self._driver, people))
+        """Personas, `sumo` or `shipped`, by their shares, one of which is drawn for each game; of one, its driver."""
+        members = tuple(map(self._named, shares))
         return members[0] if len(members) == 1 else FixedMixture(members=members, shares=tuple(shares.values()))
+
+    def _named(self, name: str) -> PlannedMember:
+        if name == SHIPPED:
+            return Shipped(without=self.campaign.seeds.index(self.seed))
+        return self._driver(SumoNonEgo() if name == SUMO else PersonaNonEgo(persona=name))
 
     def pair(self, ego: EgoStrategy, non_ego: PersonaNonEgo | RoundAnswer) -> AssessmentStage:
         """The assessment of an ego against a person."""
@@ -179,7 +184,12 @@ def training_settings(campaign: Campaign, stage: TrainingStage) -> Training:
     if stage.is_best_response:
         assert campaign.best_response is not None
         return settings.model_copy(update={"steps": campaign.best_response.steps})
-    met = max((len({persona_of(each) for each in members_of(driver)}) for driver in stage.opponent), default=1)
+    met = max((len(set(map(_person, members_of(driver)))) for driver in stage.opponent), default=1)
     personas = met * len(stage.personas)
     more = {"steps": settings.steps * personas, "segment_steps": settings.segment_steps * personas}
     return settings.model_copy(update=more)
+
+
+def _person(driver: PlannedMember) -> str | Shipped:
+    """Whose driver it is: a persona has one in each round."""
+    return driver if isinstance(driver, Shipped) else persona_of(driver)

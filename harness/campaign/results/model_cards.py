@@ -20,7 +20,7 @@ from harness.config.campaign import Campaign
 from harness.config.persona import Persona
 from harness.config.training import ATTENTIVE_SHARE
 from harness.evaluation.competence import DID_NOT_LEARN
-from harness.evaluation.strategies import NaiveEgo, against_persona, persona_alone, strategy_name
+from harness.evaluation.strategies import NaiveEgo, RobustEgo, against_persona, persona_alone, strategy_name
 from harness.files import write_atomically
 from harness.game.payoff_terms import GROUPS, TERMS
 from harness.game.roles import EGO, NON_EGO, ROLES
@@ -84,6 +84,7 @@ def model_card(
         entry,
         policy,
         is_ego=is_ego,
+        robust=strategy_name(RobustEgo()),
         facts=list(_facts(entry, manifest, policy, persona)),
         persona=persona,
         alpha=" + ".join(f"{getattr(persona, group).weight:g} × {group}" for group in GROUPS),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,15 @@ import pytest
 
 from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import RunContext
-from harness.campaign.plan.planned_drivers import PlannedDriver, Trained, TrainedBefore
+from harness.campaign.plan.planned_drivers import (
+    FixedMixture,
+    PlannedDriver,
+    Shipped,
+    SumoDriven,
+    Trained,
+    TrainedBefore,
+)
+from harness.campaign.shipped_people import shipped_people
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign
 from harness.config.persona import Persona
@@ -20,6 +29,7 @@ from harness.drivers.policy_file import write_policy
 from harness.evaluation.strategies import ATTENTIVE, Borrowed
 from harness.game.observation_layout import SIZE
 from harness.road.scene.open_scene import open_scene
+from harness.shipped_documents import named_document
 from tests.support.policies import some_policy
 from tests.support.tiny import CAREFUL, PAPER_MERGE, SPEEDY, TEXTING
 
@@ -41,6 +51,23 @@ def factory(tmp_path: Path) -> PlayerFactory:
         policies=folder.policy("texting-seed1").parent,
     )
     return PlayerFactory(context=context, scene=open_scene(PAPER_MERGE))
+
+
+def test_sides__of_a_scene_with_shipped_people_are_those_without_one_training_and_sumos_driver(
+    factory: PlayerFactory,
+) -> None:
+    opponent = (FixedMixture(members=(SumoDriven(), Shipped(without=1)), shares=(1.0, 1.0)),)
+    ((nobody, whole),) = factory.sides(opponent)  # no people of this scene: SUMO's driver plays all games
+    assert (whole, [each.takes_over for each in nobody if each]) == (1.0, [False])
+    cut_in = shipped_people(named_document("cut_in", "networks"))
+    context = replace(factory.context, shipped={"paper_merge": cut_in})
+    (people, share), (sumo, other) = replace(factory, context=context).sides(opponent)
+    assert (share, other) == (0.5, 0.5)
+    assert [each.takes_over for each in sumo if each] == [False]
+    (mixture,) = people
+    assert mixture is not None
+    assert [each.persona.name for each in mixture.members] == ["impatient", "impatient", "speedy", "speedy"]
+    assert [each.share for each in mixture.members] == [0.25] * 4
 
 
 def member_of(factory: PlayerFactory, planned: PlannedDriver) -> Member:

@@ -6,7 +6,14 @@ from typing import Any
 
 from harness.campaign.plan.paper_rounds import questions
 from harness.campaign.plan.plan import plan
-from harness.campaign.plan.planned_drivers import FixedMixture, SumoDriven, Trained, by_control
+from harness.campaign.plan.planned_drivers import (
+    FixedMixture,
+    Shipped,
+    SumoDriven,
+    Trained,
+    by_control,
+    without_shipped,
+)
 from harness.campaign.plan.stages import AssessmentStage, ConditioningStage, TrainingStage
 from harness.campaign.plan.strategy_stages import training_settings
 from harness.config.traits import PersonTraits
@@ -55,6 +62,24 @@ def test_plan__an_ego_retrained_against_sumos_driver_too_meets_it_in_an_equal_sh
     assert by_control(people) == ((people, 1.0),)
     campaign = campaign_of(*PERSONAS, **asked)
     assert training_settings(campaign, robust).steps == 3 * campaign.training.steps
+
+
+def test_plan__an_ego_retrained_against_shipped_people_meets_all_their_trainings_but_one_of_each() -> None:
+    campaign = campaign_of(seeds=[7, 8], retraining={"against": ["sumo", "shipped"]})
+    robust = [each for each in plan(campaign, []) if isinstance(each, TrainingStage) and each.name == "robust"]
+    mixtures = [FixedMixture(members=(SumoDriven(), Shipped(without=k)), shares=(1.0, 1.0)) for k in (0, 1)]
+    assert [each.opponent for each in robust] == [(each,) for each in mixtures]
+    assert training_settings(campaign, robust[0]).steps == 2 * campaign.training.steps
+    assert by_control((mixtures[0],))[1] == ((SumoDriven(),), 1.0)
+
+
+def test_without_shipped__the_others_have_their_games_or_sumos_driver() -> None:
+    shipped, sumo, anna = Shipped(without=0), SumoDriven(), Trained(stage="anna-seed1", persona="anna")
+    assert without_shipped((shipped,)) == (sumo,)
+    assert without_shipped((FixedMixture(members=(anna, shipped), shares=(1.0, 2.0)),)) == (anna,)
+    three = FixedMixture(members=(anna, shipped, sumo), shares=(1.0, 2.0, 3.0))
+    assert without_shipped((three,)) == (FixedMixture(members=(anna, sumo), shares=(1.0, 3.0)),)
+    assert without_shipped((anna,)) == (anna,)
 
 
 def test_plan__the_arms_are_those_of_personas_that_learn_alone() -> None:
