@@ -1,4 +1,4 @@
-"""How the egos by rules that are shipped, and SUMO's driver, come through all scenes.
+"""How the shipped egos, by rules and learned on all scenes, and SUMO's driver come through all scenes.
 
 python docs/league/baselines.py play                   # their leagues and ranks: about half an hour on two cores
 python docs/league/baselines.py table reports/league   # the ranks as a Markdown table
@@ -17,7 +17,8 @@ import typer
 from harness.evaluation.comparisons.tied_ranks import with_shield
 from harness.evaluation.tables import read_csv
 
-EGOS = ("sumo", "adas", "careful_and_competent", "fuzzy", "rss")
+RULES = ("sumo", "adas", "careful_and_competent", "fuzzy", "rss")
+LEARNED = tuple(f"all-scenes/{ego}-seed{seed}" for ego in ("naive", "robust") for seed in (61, 62, 63))
 GAMES = 10
 FOLDER = Path("reports/league")
 Folder = Annotated[Path, typer.Argument(help="The folder of the leagues.")]
@@ -27,9 +28,9 @@ app = typer.Typer(no_args_is_help=True, add_completion=False)
 @app.command()
 def play() -> None:
     """Play the league of each ego, with and without a shield, and rank them. Run it again to continue."""
-    for ego in EGOS:
+    for ego in (*RULES, *LEARNED):
         shield = () if ego == "sumo" else ("--shield", "rss")  # SUMO's driver has no decision to check
-        _run("league", "--ego", ego, *shield, "--episodes", GAMES, "--out", FOLDER / ego)
+        _run("league", "--ego", ego, *shield, "--episodes", GAMES, "--out", FOLDER / Path(ego).name)
     _run("league-table", FOLDER)
 
 
@@ -52,8 +53,8 @@ def table(folder: Folder = FOLDER) -> None:
 
 @app.command()
 def scenes(folder: Folder = FOLDER) -> None:
-    """Print the games that each ego fails, by scene: those alone, beside SUMO's driver and beside people together."""
-    leagues = (read_csv(folder / ego / "league.csv").sort_values("shield", kind="stable") for ego in EGOS)
+    """Print the games that each ego by rules fails, by scene, all pairings of a scene together."""
+    leagues = (read_csv(folder / ego / "league.csv").sort_values("shield", kind="stable") for ego in RULES)
     rows = pd.concat(leagues, ignore_index=True)
     rows["failed"] = rows["failure_rate"] * rows["episodes"]
     rows["player"] = [with_shield(*each) for each in zip(rows["ego"], rows["shield"], strict=True)]

@@ -19,7 +19,7 @@ from typing import Annotated
 import typer
 from scipy.stats import binomtest
 
-from harness.evaluation.result_columns import NOBODY
+from harness.evaluation.league_columns import NOBODY
 from harness.evaluation.tables import read_csv
 
 SCENES = ("merge", "left_across", "priority_crossing")

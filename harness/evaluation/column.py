@@ -60,3 +60,8 @@ EXACT = "95 % Clopper-Pearson interval"
 def rate(name: str, meaning: str, interval: str = EXACT) -> Iterator[Column]:
     """The columns of a share of games and of the ends of its interval."""
     return Column(name, NUMBER, meaning, unit=SHARE).with_interval(interval)
+
+
+ARM = Column("arm", TEXT, "The name of the arm, such as naive_vs_speedy.")
+SEED = Column("seed", COUNT, "The training seed.")
+EPISODES = Column("episodes", COUNT, "Games of the arm.", label="games")

@@ -7,7 +7,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from harness.evaluation.column import (
+    ARM,
     COUNT,
+    EPISODES,
     EXACT,
     FLAG,
     MAYBE,
@@ -15,19 +17,18 @@ from harness.evaluation.column import (
     OF_METRIC,
     P_VALUE,
     POINTS,
+    SEED,
     SHARE,
     TEXT,
     Column,
     rate,
 )
+from harness.evaluation.league_columns import LEAGUE_TABLES
 from harness.evaluation.measured_game import METRICS_OF_CONDUCT, METRICS_OF_GAMES, METRICS_OF_PLAYERS
 from harness.evaluation.result_columns import (
     ATTRIBUTION,
     EQUILIBRIA,
     FALSIFICATION,
-    LEAGUE_MEASURES,
-    LEAGUE_PAIRING,
-    LEAGUE_RANKS,
     OVER_TRAININGS,
     PERCEPTION,
     PREVENTABILITY,
@@ -42,11 +43,9 @@ from harness.evaluation.severity.closeness import CRITERIA
 
 _T = "95 % t interval"
 _PAPER = "the paper, section 4.2"
-ARM = Column("arm", TEXT, "The name of the arm, such as naive_vs_speedy.")
 _ERROR_FREE_ARM = Column("error_free_arm", TEXT, "The same without the perception errors.")
 _SHIELDED_ARM = replace(ARM, name="shielded_arm", meaning="The same with the shield.")
 PERSONA = Column("persona", TEXT, "The persona of the non-ego; of an arm with one.")
-SEED = Column("seed", COUNT, "The training seed.")
 EPISODE = Column("episode", COUNT, "The game. Equal numbers begin alike in every arm and for every training seed.")
 _GAME = (ARM, PERSONA, SEED, EPISODE)
 _EGO_FAILED = Column("ego_failed", MAYBE, "1 if the ego did not reach its goal, else 0.", source="the paper, section 4")
@@ -56,7 +55,6 @@ _WEATHER = (
     Column("visibility_m", NUMBER, "Distance up to which players see, of a scene that varies it.", optional=True),
 )
 _PLAYER = Column("player", TEXT, "`ego`, `non_ego`, `non_ego_2` and so on.")
-_EPISODES = Column("episodes", COUNT, "Games of the arm.", label="games")
 _PAIRS = (
     Column("pairs", COUNT, "Games of both arms that are compared, with the same start."),
     Column("pairs_left_out", COUNT, "Pairs with a game that errored, is missing or has an empty value."),
@@ -97,7 +95,7 @@ def _means(whose: str) -> Iterator[Column]:
 
 
 def _summary() -> Iterator[Column]:
-    yield from (ARM, PERSONA, SEED, _EPISODES)
+    yield from (ARM, PERSONA, SEED, EPISODES)
     yield Column("errors", COUNT, "Games that could not be played.")
     yield from rate("failure_rate", _FAILED)
     for outcome in ("collision", "rail", "timeout"):
@@ -258,7 +256,7 @@ _TABLES = {
     "populations": (
         ARM,
         Column("population", TEXT, "The population that drove against the ego."),
-        *(SEED, PERSONA, _EPISODES),
+        *(SEED, PERSONA, EPISODES),
         Column("errors", COUNT, "Games that could not be played."),
         *rate("failure_rate", _FAILED),
         *(each for each in _means("ego") if each.name in ("mean_speed_mps", "ego_payoff")),
@@ -337,8 +335,7 @@ _TABLES = {
     "reference_drivers": (*_GAME, _outcome("ego", "ego"), *REFERENCE_DRIVERS),
     "takeovers": (ARM, SEED, EPISODE, *TAKEOVERS),
     "preventability": (ARM, PERSONA, SEED, *PREVENTABILITY),
-    "league_ranks": LEAGUE_RANKS,
-    "league": (*LEAGUE_PAIRING, SEED, ARM, _EPISODES, *LEAGUE_MEASURES),
+    **LEAGUE_TABLES,
 }
 TABLES: Mapping[str, Mapping[str, Column]] = {
     table: {column.name: column for column in columns} for table, columns in _TABLES.items()

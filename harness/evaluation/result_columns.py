@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from harness.evaluation.column import COUNT, FLAG, MAYBE, NUMBER, P_VALUE, POINTS, SHARE, TEXT, Column, rate
+from harness.evaluation.column import COUNT, FLAG, MAYBE, NUMBER, P_VALUE, POINTS, SEED, SHARE, TEXT, Column, rate
 
 _T = "95 % t interval"
 _DRIVER = Column("driver", TEXT, "The reference driver.")
@@ -132,12 +132,11 @@ _CRITERION = Column(
     TEXT,
     "`failure`: the ego fails; else the reference driver that prevents it from the conflict on.",
 )
-_SEED = Column("seed", COUNT, "The training seed.")
 _SEARCHER = Column("searcher", TEXT, "`random`, `cross-entropy` or `cma-es`.")
 _GAMES = Column("games", COUNT, "Games of each search.")
 SEARCHES = (
     Column("arm", TEXT, "The arm whose players play."),
-    *(_SEED, _SEARCHER),
+    *(SEED, _SEARCHER),
     Column("learned", FLAG, "Whether learned people play, from random starts; else SUMO drives for the people."),
     Column("repeat", COUNT, "The search, of several with other random numbers."),
     *(_CRITERION, _GAMES),
@@ -147,7 +146,7 @@ SEARCHES = (
 FALSIFICATION = (
     _CRITERION,
     Column("arm", TEXT, "The arm of learned people."),
-    _SEED,
+    SEED,
     Column("searched_arm", TEXT, "The arm whose starts and ordinary drivers were searched."),
     *(_SEARCHER,),
     Column("repeats", COUNT, "Searches on each side."),
@@ -156,53 +155,6 @@ FALSIFICATION = (
     Column("found_by_searcher", COUNT, "Searches of the searcher in which a game met the criterion."),
     Column("mean_games_person", NUMBER, "Mean games with learned people until the first find, at most `games`."),
     Column("mean_games_searcher", NUMBER, "The same of the searcher."),
-)
-
-NOBODY, SUMO_DRIVER = "nobody", "sumo"
-"""The column `person` of arms without a persona."""
-UNTRAINED = (NOBODY, SUMO_DRIVER)
-LEAGUE_EGO = (
-    Column("ego", TEXT, "The ego of the league."),
-    Column("shield", TEXT, "The rule of the shield around it (docs/shield.md): `rss`. Empty: it has none."),
-)
-LEAGUE_PAIRING = (
-    *LEAGUE_EGO,
-    Column("scene", TEXT, "The scene."),
-    Column("person", TEXT, "`nobody`, `sumo` (SUMO's driver in the person's seat), or the persona."),
-)
-_ENDS = ("collision", "rail", "timeout")
-LEAGUE_MEASURES = (
-    Column("errors", COUNT, "Games that could not be played."),
-    *rate("failure_rate", "Share of the games in which the ego failed."),
-    *(Column(f"{each}s", MAYBE, f"Games in which the ego's outcome is {each}.") for each in _ENDS),
-    *rate(
-        "preventable_rate",
-        "Share of the games that the ego fails, and the careful and competent driver of UN R157 does not, from "
-        "the start in its place; judged against personas.",
-    ),
-    Column(
-        "serious_injuries",
-        NUMBER,
-        "Expected number of games with a serious injury (MAIS3+), per game, at most: the sum of mais3_risk_high where "
-        "it is known, over the games that were played.",
-    ),
-    *rate("harm_to_others_rate", "Share of the games with harm_to_others: a person or a bystander fails."),
-    Column("mean_speed_mps", NUMBER, "Mean over the games of the ego's average speed."),
-    *rate("hard_brake_rate", "Share of the games in which the ego brakes hard (`hard_brake` in docs/manoeuvres.md)."),
-    Column(
-        "reason",
-        TEXT,
-        "Why the row says nothing about how the ego copes with people: a player can't drive the scene alone. Empty "
-        "where both can, and for `nobody`.",
-    ),
-)
-LEAGUE_RANKS = (
-    Column("rank", COUNT, "1, and the number of egos that fail significantly less often in the same games."),
-    *LEAGUE_EGO,
-    Column("games", COUNT, "Games that every ego of the table played."),
-    Column("games_left_out", COUNT, "Other games of this ego."),
-    *rate("failure_rate", "Share of these games in which the ego failed."),
-    Column("told_apart", TEXT, "The egos with significantly more or fewer failures, joined by ` + `: McNemar, Holm."),
 )
 
 _CROSSED = "95 % interval over trainings and starts (a two-level bootstrap)"

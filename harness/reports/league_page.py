@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from harness.evaluation.comparisons.tied_ranks import with_shield
-from harness.evaluation.result_columns import SUMO_DRIVER, UNTRAINED
+from harness.evaluation.league_columns import SUMO_DRIVER, UNTRAINED
 from harness.reports.failure_table import ORDINARY, FailureCell
 from harness.reports.numbers import NO_SPACE, interval, number, percent
 from harness.reports.page_template import environment_of

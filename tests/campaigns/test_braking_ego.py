@@ -125,7 +125,7 @@ def test_files_for_ci__have_each_pairing(league: Path) -> None:
 def test_table__the_same_ego_by_another_name_shares_the_rank(league: Path, tmp_path: Path) -> None:
     for name in ("brake", "twin"):
         shutil.copytree(league, tmp_path / name, ignore=shutil.ignore_patterns("traces", "replays", "tensorboard"))
-    write_csv(read_csv(league / "league.csv").assign(ego="twin"), tmp_path / "twin" / "league.csv")
+    write_csv(read_csv(league / "league_games.csv").assign(ego="twin"), tmp_path / "twin" / "league_games.csv")
     done = CliRunner().invoke(app, ["league-table", str(tmp_path)])
     assert done.exit_code == 0, done.output
     ranks = read_csv(tmp_path / "league_ranks.csv")

@@ -19,7 +19,7 @@ ROW = read_csv(REPOSITORY / "reports" / "roads" / "merge-learned-on-one-road" / 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """Each ego plays 20 games in each of two scenes, SUMO's driver without a shield."""
-    for place, ego in enumerate(table.EGOS):
+    for place, ego in enumerate(table.RULES):
         rows = [
             {**ROW, "ego": ego, "shield": shield, "scene": scene, "episodes": 20, "failure_rate": rate}
             for scene, rate in (("brake", 0.05 * place), ("zebra", 0.1))
@@ -48,4 +48,4 @@ def test_scenes__count_the_failures_of_each_ego(folder: Path, capsys: pytest.Cap
     header, _, brake, zebra = capsys.readouterr().out.splitlines()
     assert header.startswith("| scene | sumo | adas | adas with shield rss |")
     assert brake.startswith("| `brake` | 0 of 20 | 1 of 20 | 1 of 20 | 2 of 20 |")
-    assert zebra.count("2 of 20") == 2 * len(table.EGOS) - 1
+    assert zebra.count("2 of 20") == 2 * len(table.RULES) - 1

@@ -64,14 +64,30 @@ def test_write_outputs__runs_the_commands_whose_run_folders_are_there(
 
 def test_carry_out__a_copied_folder_replaces_the_one_before(tmp_path: Path) -> None:
     for folder, names in {"reports/merge/policies": ["a", "b"], "policies/merge": ["b", "c"]}.items():
-        (tmp_path / folder).mkdir(parents=True)
         for name in names:
-            (tmp_path / folder / name).write_text(folder)
+            (tmp_path / folder / name).mkdir(parents=True)
+            (tmp_path / folder / name / "policy.json").write_text(folder)
     step = publish.Step.model_validate({"copy": "reports/merge/policies", "to": "policies/merge"})
     publish.carry_out(step, tmp_path)
-    found = {each.name: each.read_text() for each in (tmp_path / "policies" / "merge").iterdir()}
+    found = {each.name: (each / "policy.json").read_text() for each in (tmp_path / "policies" / "merge").iterdir()}
     assert found == {"a": "reports/merge/policies", "b": "reports/merge/policies"}
     assert [each.name for each in (tmp_path / "policies").iterdir()] == ["merge"]
+
+
+@pytest.mark.parametrize(
+    ("policies", "people"),
+    [
+        (["naive", "anna", "careful", "retrained_anna", "bert"], ["anna-seed1", "bert-seed1"]),
+        (["naive", "people", "anna", "bert", "robust"], ["people-seed1"]),
+    ],
+)
+def test_people__of_a_run_are_its_personas_or_their_one_network(
+    tmp_path: Path, policies: list[str], people: list[str]
+) -> None:
+    for name in policies:
+        (tmp_path / "policies" / f"{name}-seed1").mkdir(parents=True)
+    (tmp_path / "manifest.json").write_text('{"personas": ["anna", "bert"], "baseline": "careful"}')
+    assert [each.name for each in publish.people_of(tmp_path)] == people
 
 
 def test_carry_out__the_long_tables_of_a_packed_run_are_compressed(tmp_path: Path) -> None:
@@ -88,7 +104,7 @@ def test_carry_out__the_long_tables_of_a_packed_run_are_compressed(tmp_path: Pat
     ids=str,
 )
 def test_step__is_one_of_three(keys: dict[str, str]) -> None:
-    with pytest.raises(ValueError, match=r"a step has one of|belong together|belongs to"):
+    with pytest.raises(ValueError, match=r"a step has one of|belong together|belong to"):
         publish.Step.model_validate(keys)
 
 

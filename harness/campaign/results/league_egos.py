@@ -6,17 +6,12 @@ from pathlib import Path
 
 import pandas as pd
 
-from harness.campaign.plan.stages import arms_of
-from harness.campaign.results.league_rows import person_in, shield_in
-from harness.campaign.storage.manifest import campaign_in, planned
-from harness.campaign.storage.run_folder import MANIFEST, RunFolder
+from harness.campaign.results.league_games import LEAGUE_GAMES, games_in
 from harness.config.campaign import Assessment
 from harness.errors import UsageError
-from harness.evaluation.comparisons.tied_ranks import GAME, PLAYER, league_ranks
+from harness.evaluation.comparisons.tied_ranks import PLAYER, league_ranks
 from harness.evaluation.tables import read_csv, write_csv
-from harness.reports.provenance import scene_of
 
-LEAGUE = "league.csv"
 RANKS = "league_ranks.csv"
 SIGNIFICANCE = Assessment().significance
 
@@ -26,10 +21,10 @@ def rank_leagues(folder: Path) -> tuple[pd.DataFrame, Path]:
 
     Raises UsageError if the leagues of the folder have fewer than two egos, or if no game was played by all egos.
     """
-    leagues = sorted(file.parent for file in folder.glob(f"*/{LEAGUE}") if not read_csv(file).empty)
-    games = pd.concat([_games_of(league) for league in leagues], ignore_index=True) if leagues else None
+    leagues = {file.parent.name: _games_of(file) for file in sorted(folder.glob(f"*/{LEAGUE_GAMES}"))}
+    games = pd.concat(leagues.values(), ignore_index=True) if leagues else None
     if games is None or len(games[PLAYER].drop_duplicates()) < 2:
-        found = ", ".join(each.name for each in leagues) or "none"
+        found = ", ".join(leagues) or "none"
         raise UsageError.of(folder, "", f"has fewer than two egos: {found}", "play some: harness league --ego EGO")
     table = league_ranks(games, SIGNIFICANCE)
     if not table["games"].any():
@@ -39,22 +34,9 @@ def rank_leagues(folder: Path) -> tuple[pd.DataFrame, Path]:
     return table, folder / RANKS
 
 
-def _games_of(league: Path) -> pd.DataFrame:
-    """The games of the scenes of a league, as `league_ranks` reads them: each game alone or beside SUMO's driver once,
-    though it is played for people of every training seed."""
-    ego = read_csv(league / LEAGUE)["ego"].iloc[0]
-    found = []
-    for file in sorted(league.glob(f"*/{MANIFEST}")):
-        run = RunFolder(file.parent)
-        episodes = read_csv(run.path / "episodes.csv")
-        played = episodes[(episodes["error"] == "") & episodes["ego_failed"].notna()]
-        manifest = run.manifest()
-        campaign = campaign_in(manifest)
-        arms = arms_of(planned(manifest))
-        people = {name: person_in(arm) for name, arm in arms.items()}
-        shields = {name: shield_in(arm, campaign) for name, arm in arms.items()}
-        named = played.assign(scene=scene_of(manifest), person=played["arm"].map(people), ego=ego)
-        named["shield"] = played["arm"].map(shields)
-        found.append(named.assign(seed=named["seed"].where(named["persona"] != "", 0)))
-    games = pd.concat(found, ignore_index=True)
-    return games.drop_duplicates([*GAME, *PLAYER])[[*GAME, *PLAYER, "ego_failed"]]
+def _games_of(file: Path) -> pd.DataFrame:
+    try:
+        return games_in(read_csv(file))
+    except (LookupError, ValueError) as error:
+        message, remedy = "is not the table of a league", "run the league again, or remove its folder"
+        raise UsageError.of(file, "", message, remedy) from error

@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 
 from harness.campaign.plan.alone_bounds import alone_bounds
-from harness.campaign.plan.stages import arms_of
+from harness.campaign.plan.stages import AssessmentStage, arms_of
+from harness.campaign.results.league_games import games_sha256, outcome_cells
 from harness.campaign.storage.manifest import campaign_in, planned
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign
 from harness.evaluation.comparisons.comparison import games_by_arm, rate_cells
 from harness.evaluation.comparisons.preventability import by_regulation
 from harness.evaluation.competence import gate
-from harness.evaluation.result_columns import NOBODY, SUMO_DRIVER, UNTRAINED
+from harness.evaluation.league_columns import NOBODY, SUMO_DRIVER, UNTRAINED
 from harness.evaluation.strategies import Arm, ShieldedEgo, SumoNonEgo, strategy_name
 from harness.evaluation.tables import read_csv
 from harness.evaluation.worst_first import worst_first
@@ -76,7 +77,9 @@ def _rows(ego: str, run: RunFolder, games: dict[tuple[str, str, int], str]) -> I
     )
     manifest, games_of = run.manifest(), games_by_arm(episodes)
     scene, campaign = scene_of(manifest), campaign_in(manifest)
-    arms = arms_of(planned(manifest))
+    plan = planned(manifest)
+    arms = arms_of(plan)
+    stages = {(each.name, each.seed): each for each in plan if isinstance(each, AssessmentStage)}
     file = run.path / "preventability.csv"
     prevented = read_csv(file) if file.is_file() else None
     page = (run.path / "report.html").read_text(encoding="utf-8")
@@ -94,6 +97,7 @@ def _rows(ego: str, run: RunFolder, games: dict[tuple[str, str, int], str]) -> I
         cells |= {"serious_injuries": played["mais3_risk_high"].sum() / len(played) if len(played) else np.nan}
         cells |= rate_cells("hard_brake_rate", hard, len(played))
         cells["reason"] = "" if person == NOBODY else gate(alone_bounds(campaign, arms[arm]), seed, games_of)["reason"]
+        cells |= outcome_cells(of_arm) | {"games_sha256": games_sha256(run, manifest, stages[arm, seed])}
         of_regulation = [] if prevented is None else by_regulation(prevented[prevented["seed"] == seed], arm)
         for end in ("", "_low", "_high"):
             cells[f"preventable_rate{end}"] = of_regulation[0][f"from_start_rate{end}"] if of_regulation else np.nan

@@ -1,6 +1,7 @@
 """The results of a league, from the run folders of its campaigns.
 
 league.csv     a row for each pairing, worst first; after them those with a player that can't drive the scene alone
+league_games.csv    which games of each pairing the ego failed, for `harness league-table`
 league.html    the matrix of scenes and people, and the rows; their cells open games in the reports of the scenes
 result.json    the rows, what failed, and the exit code
 junit.xml      a test for each pairing and each stage: an error where games could not be played
@@ -17,6 +18,7 @@ import pandas as pd
 
 from harness.campaign.results.ci_files import JUNIT, RESULT, write_record
 from harness.campaign.results.kept_results import RunResult
+from harness.campaign.results.league_games import LEAGUE_GAMES
 from harness.campaign.results.league_rows import league_rows
 from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.versions import versions
@@ -56,6 +58,7 @@ def write_league(ego: str, folder: Path, results: Mapping[str, RunResult]) -> Le
         ignore_index=True,
     )
     write_csv(table, folder / "league.csv")
+    write_csv(table_of("league_games", rows), folder / LEAGUE_GAMES)
     addresses = [games[row["scene"], row["arm"], row["seed"]] for row in table.to_dict("records")]
     failed = list(_failures(results))
     write_atomically(folder / "league.html", render_league(ego, table, addresses, failed).encode())

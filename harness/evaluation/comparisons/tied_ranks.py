@@ -10,7 +10,7 @@ import pandas as pd
 from harness.evaluation.comparisons.comparison import holm, mcnemar, rate_cells
 from harness.evaluation.tables import table_of
 
-GAME = ["scene", "person", "seed", "episode"]
+GAME = ["games_sha256", "episode"]
 """What names a game that several egos play."""
 PLAYER = ["ego", "shield"]
 """What names an ego: with a shield around it, it is another one than without."""

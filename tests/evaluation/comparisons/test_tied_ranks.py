@@ -13,8 +13,8 @@ SIGNIFICANCE = 0.01
 
 
 def games(ego: str, failed: Sequence[int], first: int = 0, shield: str = "") -> pd.DataFrame:
-    """Games of an ego in one scene, from this episode on: 1 where it fails."""
-    played = {"scene": "merge", "person": "speedy", "seed": 1, "ego": ego, "shield": shield}
+    """Games of an ego against one person, from this episode on: 1 where it fails."""
+    played = {"games_sha256": "a1", "ego": ego, "shield": shield}
     return pd.DataFrame([{**played, "episode": first + k, "ego_failed": each} for k, each in enumerate(failed)])
 
 
@@ -56,6 +56,12 @@ def test_ranks__only_games_count_that_every_ego_played() -> None:
     assert table["games"].tolist() == [2, 2]
     assert table.set_index("ego")["games_left_out"].to_dict() == {"a": 2, "b": 1}
     assert table["failure_rate"].tolist() == [0.0, 0.0]
+
+
+def test_ranks__games_of_other_people_are_others() -> None:
+    """Leagues of before and after a change of the scene or its people share no game."""
+    changed = games("b", [0, 0]).assign(games_sha256="b2")
+    assert league_ranks(pd.concat([games("a", [1, 1]), changed]), SIGNIFICANCE)["games"].tolist() == [0, 0]
 
 
 def test_ranks__two_games_of_one_name_are_refused() -> None:
