@@ -95,7 +95,15 @@ def _watch(tables: RunTables) -> Iterator[NextStep]:
 
 
 def _widen(tables: RunTables) -> Iterator[NextStep]:
-    if tables.acceptance is None:
+    trained = [
+        name for name, entry in tables.stages.items() if entry["kind"] == "training" and entry["status"] == "done"
+    ]
+    if trained and not tables.personas:
+        yield NextStep(
+            sentence="This ego has met no person. Play it against all people in all scenes.",
+            command=f"harness league --ego policies/{trained[-1]}",
+        )
+    elif tables.acceptance is None:
         yield NextStep(
             sentence="State what this ego must achieve: add bounds to the campaign, and the command passes or fails.",
             command="[acceptance]\nfailure_rate = 0.1",

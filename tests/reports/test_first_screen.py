@@ -194,6 +194,14 @@ def answers(run):
     return {each.question: [line.replace(NO_SPACE, " ") for line in each.lines] for each in given}
 
 
+def test_next_steps__of_a_campaign_without_personas_are_to_meet_people():
+    trained = {"kind": "training", "status": "done", "stopped": "budget", "seed": 1}
+    run = RunTables(
+        manifest={"name": "alone", "personas": [], "stages": {"naive-seed1": trained, "robust-seed1": trained}}
+    )
+    assert next_steps(run)[-1].command == "harness league --ego policies/robust-seed1"
+
+
 def test_next_steps__of_a_run_without_games_begin_with_playing_them():
     step = next_steps(run_of(is_from_tables=True))[0]
     assert step.sentence.endswith("play the games, which are not published, once more.")

@@ -414,7 +414,7 @@ def test_page__every_table_has_a_caption_and_scoped_headings(html, page):
 
 def test_page__an_empty_run_is_a_page_too():
     page = Page(rendered(manifest={"name": "merge", "stages": {}}))
-    assert "No persona has been assessed yet." in page.text
+    assert "No persona was assessed." in page.text
 
 
 def test_page__ignores_the_users_matplotlib_settings(small, html):
