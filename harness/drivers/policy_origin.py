@@ -35,6 +35,8 @@ class Origin(Document):
     persona: _Text | None = None
     persona_sha256: _Text | None = None
     scene: _Text | None = None
+    roads: tuple[_Text, ...] = ()
+    """Further scenes on which it learned."""
     step_s: float | None = None
     friction: tuple[float, float] | None = None
     """The range of the games' coefficients of friction."""
@@ -65,11 +67,13 @@ def other_games(folder: Path, scene: Scene, world: World, *, player: int, person
             message += f"{_of_car(car)}: its actions and observations would have another meaning"
             remedy = "give that player the actuators it learned with, or train the policy in this scene"
             raise UsageError.of(policy_files(folder)[0], "cars", message, remedy)
-    pairs = {"scene": (origin.scene, scene.name), "player": (origin.player, ROLES[player])}
+    is_road = scene.name in origin.roads  # the card does not say its friction
+    learned_in = scene.name if is_road else origin.scene
+    pairs = {"scene": (learned_in, scene.name), "player": (origin.player, ROLES[player])}
     if origin.step_s is not None:
         pairs["step_s"] = (f"{origin.step_s:g}", f"{world.step_s:g}")
     low, high = _friction(scene)
-    if origin.friction is not None and not origin.friction[0] <= low <= high <= origin.friction[1]:
+    if origin.friction is not None and not is_road and not origin.friction[0] <= low <= high <= origin.friction[1]:
         pairs["friction"] = (_range(origin.friction), _range((low, high)))
     if persona is not None and origin.persona_sha256 not in (None, persona_hash(persona)):
         of_same_name = " with another payoff or other limits" if origin.persona == persona.name else ""

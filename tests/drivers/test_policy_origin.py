@@ -44,6 +44,12 @@ def test_games__each_difference_is_named(merge: OpenScene, tmp_path: Path) -> No
     )
 
 
+def test_games__of_a_road_on_which_a_policy_learned_too_are_the_same(merge: OpenScene, tmp_path: Path) -> None:
+    card = origin_card(merge.document, merge.world, EGO) | {"scene": "crossing", "friction": [0.3, 0.5]}
+    assert told(write(tmp_path, **card, roads=["zebra", "merge"]), merge) == ""
+    assert "scene crossing, here merge" in told(write(tmp_path, **card, roads=["zebra"]), merge)
+
+
 @pytest.mark.parametrize(("friction", "is_told"), [((0.5, 0.8), False), ((0.4, 0.8), True), ((0.8, 1.0), True)])
 def test_friction__within_the_range_that_a_policy_learned_in_is_no_difference(
     friction: tuple[float, float], is_told: bool, merge: OpenScene, tmp_path: Path
