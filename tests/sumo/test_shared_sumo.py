@@ -11,6 +11,7 @@ import libsumo
 import numpy as np
 import pytest
 
+from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena
 from harness.environments.seats import Seat
 from harness.errors import SimulationError
@@ -153,11 +154,34 @@ def test_reload__loads_sumo_once_for_all(
 def test_scenes__with_other_options_of_sumo_have_a_process_of_their_own(scene: OpenScene, other: OpenScene) -> None:
     by_sumo = SceneGames(scene=scene, games=1, taken_over=(True, False))
     assert not can_share(games_of(other), by_sumo)
-    simulations = open_simulations([games_of(scene), by_sumo, games_of(other)], seed=1)
-    kinds = [type(each) for each in simulations]
+    simulations = open_simulations([games_of(scene), by_sumo, games_of(other), by_sumo], seed=1)
+    kinds, far = (
+        [type(each) for each in simulations],
+        [each for each in simulations if isinstance(each, SubprocessSimulation)],
+    )
     for each in simulations:
         each.close()
-    assert kinds == [LibsumoSimulation, SubprocessSimulation, LibsumoSimulation]
+    assert kinds == [LibsumoSimulation, SubprocessSimulation] * 2
+    assert far[0].child is far[1].child
+
+
+def test_simulations__side_by_side_in_a_child_give_the_same_bytes_and_rules() -> None:
+    scenes = [open_scene(REPOSITORY / "networks" / name) for name in ("merge", "left_across")]
+    parts = [SceneGames(scene=scene, games=2, taken_over=(True, False)) for scene in scenes]
+    actions = np.random.default_rng(0).normal(0.1, 0.2, (40, 2, 2, 2))
+    found = []
+    for kind in (LibsumoSimulation, SubprocessSimulation):
+        simulations = kind.side_by_side(parts, 1)
+        with ExitStack() as stack:
+            arenas = []
+            for scene, simulation in zip(scenes, simulations, strict=True):
+                arena = Arena(scene, 2, [Seat(None), Seat(SumoDriver())], simulation=simulation)
+                arenas.append(played(stack.enter_context(closing(arena)), actions))
+            found.append(list(zip(*arenas, strict=True)))
+            simulations[0].place(*(np.repeat(each, 2, axis=0) for each in FAR_OFF))
+            with pytest.raises(SimulationError, match="1 of 2 simulations have placed their players"):
+                simulations[0].step()
+    assert found[0] == found[1]
 
 
 def test_failure__of_one_scene_closes_all(scene: OpenScene, tmp_path: Path) -> None:

@@ -41,7 +41,8 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
 
 @pytest.fixture
 def far(scene: OpenScene) -> Iterator[SubprocessSimulation]:
-    with closing(SubprocessSimulation(games_of(scene), 1)) as simulation:
+    [simulation] = SubprocessSimulation.side_by_side([games_of(scene)], 1)
+    with closing(simulation):
         yield simulation
 
 
@@ -97,12 +98,12 @@ def test_refusal__to_load_leaves_no_child(scene: OpenScene, tmp_path: Path) -> N
     broken = build_scene(tmp_path)
     broken.net_file.write_text("<net")
     with pytest.raises(SimulationError, match=r"n\.net\.xml"):
-        SubprocessSimulation(games_of(broken), 1)
+        SubprocessSimulation.side_by_side([games_of(broken)], 1)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 def test_crash__of_the_child_is_an_error_that_names_the_signal(far: SubprocessSimulation) -> None:
-    os.kill(far._child.pid, signal.SIGSEGV)
+    os.kill(far.child.process.pid, signal.SIGSEGV)
     for _ in range(2):
         with pytest.raises(SimulationError, match="SIGSEGV"):
             far.reload(1)
@@ -123,16 +124,18 @@ def test_interrupt__ends_the_child(far: SubprocessSimulation, monkeypatch: pytes
 
 def test_close__ends_the_child_and_may_be_repeated(far: SubprocessSimulation) -> None:
     far.close()
-    assert far._child.poll() == 0
+    assert far.child.process.poll() == 0
     far.close()
     with pytest.raises(SimulationError, match="closed"):
         far.reload(1)
 
 
 def test_garbage__ends_the_child(scene: OpenScene) -> None:
-    child = SubprocessSimulation(games_of(scene), 1)._child
+    [simulation] = SubprocessSimulation.side_by_side([games_of(scene)], 1)
+    process = simulation.child.process
+    del simulation
     gc.collect()
-    assert child.poll() == 0
+    assert process.poll() == 0
 
 
 def test_prints__of_sumo_do_not_enter_the_pipe() -> None:
@@ -160,7 +163,7 @@ subprocess_simulation.serve()
     )
     assert child.stdin is not None
     assert child.stdout is not None
-    for message, answer in (((None, 1), None), (("reload", 5), 5)):
+    for message, answer in (((None, 1), None), (("reload", 0, 5), 5)):
         child.stdin.write(pickle.dumps(message))
         child.stdin.flush()
         assert pickle.load(child.stdout) == (answer, None)
@@ -178,7 +181,7 @@ games = SceneGames(scene=open_scene(pathlib.Path("straight")), games=1, taken_ov
 both = [each for _ in range(2) for each in open_simulations([games], seed=1)]
 os.chdir("/")
 both[1].reload(2)
-print(both[1]._child.pid, flush=True)
+print(both[1].child.process.pid, flush=True)
 {end}
 """
 
@@ -200,7 +203,8 @@ def test_soak__players_off_the_road_near_a_zipper_junction_do_not_crash_sumo(tmp
     """SUMO 1.28 crashes (SIGSEGV within a thousand steps) if lane changes take time, and with its sublane model."""
     scene = build_scene(tmp_path, ZIPPER_NODES, ZIPPER_EDGES, ZIPPER, goal_m=100.0)
     generator = np.random.default_rng(0)
-    with closing(SubprocessSimulation(games_of(scene, 4), 1)) as simulation:
+    [simulation] = SubprocessSimulation.side_by_side([games_of(scene, 4)], 1)
+    with closing(simulation):
         for episode in range(14):
             x, y = generator.uniform(90, 150, (4, 2)), generator.uniform(-9, 0, (4, 2))
             heading, turning = np.zeros((4, 2)), generator.normal(0.0, 0.03, (4, 2))
