@@ -1,4 +1,4 @@
-"""The tables of the egos of campaigns/all-scenes.toml in docs/robust.md, from the leagues of docs/league/baselines.py.
+"""The tables of docs/one-ego-for-all-scenes.md, from the leagues of docs/league/baselines.py.
 
     python docs/robust/all_scenes.py seeds reports/league      # what was expected of each training, and what it does
     python docs/robust/all_scenes.py scenes reports/league     # failures in each scene, of all trainings together

@@ -68,6 +68,7 @@ SECTIONS = {
         "personas-on-the-merge",
         "game-on-the-merge",
         "robust",
+        "one-ego-for-all-scenes",
         "baselines",
         "reproduction",
         "reproduction-assumptions",

@@ -1,4 +1,4 @@
-"""The script behind the tables of egos that learn on all scenes, in docs/robust.md."""
+"""The script behind the tables of egos that learn on all scenes, in docs/one-ego-for-all-scenes.md."""
 
 from __future__ import annotations
 
