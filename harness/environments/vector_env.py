@@ -29,6 +29,8 @@ OBSERVATION_SPACE, ACTION_SPACE = space_of(SIZE), space_of(ACTIONS)
 class Finished:
     """A learner's finished game."""
 
+    road: str
+    """The name of its scene."""
     payoff: float
     steps: int
     outcome: Outcome
@@ -172,7 +174,8 @@ class ArenaVecEnv(GamesVecEnv):
         outcome = Outcome(int(state.outcome[game, self.learner]))
         took_part = state.present[game] | (state.outcome[game] != Outcome.RUNNING)  # a player at its goal has left
         payoff, steps, alone = float(self._payoff[game]), int(state.step[game]), int(took_part.sum()) == 1
-        self._finished.append(Finished(payoff=payoff, steps=steps, outcome=outcome, alone=alone))
+        road = self.arena.scene.document.name
+        self._finished.append(Finished(road=road, payoff=payoff, steps=steps, outcome=outcome, alone=alone))
         self._games.ended(game, payoff)
         self._payoff[game] = 0.0
 

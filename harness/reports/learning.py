@@ -146,6 +146,8 @@ def stopped(stage: Mapping[str, Any]) -> str:
     if reason == DID_NOT_LEARN and stage.get("played"):
         asked = f"at least {percent(stage['goal_share_asked'])}"
         text += f": goal in {stage['goals']} of {stage['played']} games alone, {asked} asked"
+    if reason == DID_NOT_LEARN and stage.get("failing_roads"):
+        text += f"; most of its last games alone failed on {', '.join(stage['failing_roads'])}"
     return text
 
 

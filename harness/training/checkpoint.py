@@ -44,9 +44,9 @@ class Progress:
     segment_payoffs: list[float]
     """Mean payoff of each segment; -inf if no game ended in it."""
     curve: list[CurvePoint]
-    alone_games: list[int]
-    """Games of each segment without another player."""
-    alone_failures: list[int]
+    alone_games: list[dict[str, int]]
+    """Games of each segment without another player, on each road."""
+    alone_failures: list[dict[str, int]]
     """Those of them that did not end at the goal."""
     converged_at: int | None = None
     """Steps after which the curve had converged; None: it had not."""

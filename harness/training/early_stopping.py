@@ -7,7 +7,8 @@ the last updates are made where the driver will be.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 
@@ -26,7 +27,8 @@ MOST_FAILURES = 0.5
 RULE = (
     f"stop when the mean payoff of the latest {LATEST} segments is above that of the {LATEST} before by no more than "
     f"{TOLERANCE:.0%} of the span between the worst and the best segment so far, leaving out segments before attention "
-    f"lapses; not while more than {MOST_FAILURES:.0%} of the games without another player fail in the latest {LATEST}; "
+    f"lapses; not while more than {MOST_FAILURES:.0%} of the games on a road without another player fail in the latest "
+    f"{LATEST}; "
     "then train on while the deviation of the actions becomes narrow"
 )
 
@@ -45,15 +47,24 @@ def has_converged(segment_payoffs: Sequence[float]) -> bool:
     return latest - before <= TOLERANCE * span
 
 
-def still_fails(games: Sequence[int], failures: Sequence[int]) -> bool:
-    """Whether a player can't drive yet, given its games without another player in each segment and their failures.
+def failing_roads(games: Sequence[Mapping[str, int]], failures: Sequence[Mapping[str, int]]) -> list[str]:
+    """The roads on which a player can't drive yet, given the number of its games without another player on each road in
+    each segment, and of their failures.
 
     Only these games count: in the others, a failure may be the opponent's doing, and a selfish player may accept it. A
     training without such games in the latest segments (`alone_share = 0`) is never held back. The bound is far from the
     campaign's for assessment, because training explores.
     """
-    latest = sum(games[-LATEST:])
-    return latest > 0 and sum(failures[-LATEST:]) > MOST_FAILURES * latest
+    played, failed = Counter[str](), Counter[str]()
+    for counts, segments in ((played, games), (failed, failures)):
+        for each in segments[-LATEST:]:
+            counts.update(each)
+    return [road for road in played if failed[road] > MOST_FAILURES * played[road]]
+
+
+def by_road(roads: Iterable[str]) -> dict[str, int]:
+    """The number of games on each road, given the road of each game."""
+    return dict(Counter(roads))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -28,7 +28,7 @@ from harness.game.roles import EGO
 from harness.game.seeding import seed_of
 from harness.training.checkpoint import CurvePoint, Progress, read_checkpoint, write_checkpoint
 from harness.training.compiled_ppo import CompiledPPO
-from harness.training.early_stopping import Narrowing, has_converged, still_fails
+from harness.training.early_stopping import Narrowing, by_road, failing_roads, has_converged
 from harness.training.imitation import imitate
 from harness.training.policy_arrays import layers_of, policy_of, put_policy
 from harness.training.regret_starts import RegretReplays, first_scores, replays_of
@@ -103,7 +103,7 @@ def _converged_at(spec: TrainingSpec, progress: Progress) -> int | None:
     if not settings.early_convergence or progress.steps >= Narrowing.of(settings, None).start:
         return None
     attentive = ceil(attentive_steps(spec) / settings.segment_steps)
-    fails = still_fails(progress.alone_games, progress.alone_failures)
+    fails = failing_roads(progress.alone_games, progress.alone_failures)
     return progress.steps if not fails and has_converged(progress.segment_payoffs[attentive:]) else None
 
 
@@ -195,15 +195,16 @@ def _segment(
         if not torch.isfinite(value).all():
             raise FloatingPointError(f"parameter {name} is not finite after {model.num_timesteps} steps")
     payoffs = [game.payoff for game in curve.games]
-    alone = [game.outcome is not Outcome.GOAL for game in curve.games if game.alone]
+    alone = [game for game in curve.games if game.alone]
+    failed = [game for game in alone if game.outcome is not Outcome.GOAL]
     mean = float(np.mean(payoffs)) if payoffs else float("-inf")
     after = Progress(
         segments=progress.segments + 1,
         steps=model.num_timesteps,
         segment_payoffs=[*progress.segment_payoffs, mean],
         curve=curve.windows,
-        alone_games=[*progress.alone_games, len(alone)],
-        alone_failures=[*progress.alone_failures, sum(alone)],
+        alone_games=[*progress.alone_games, by_road(game.road for game in alone)],
+        alone_failures=[*progress.alone_failures, by_road(game.road for game in failed)],
         converged_at=progress.converged_at,
         regret=replays.scores if replays is not None else None,
     )

@@ -31,8 +31,8 @@ PROGRESS = Progress(
     steps=16,
     segment_payoffs=[-float("inf"), 1.5],
     curve=[FIRST, SECOND],
-    alone_games=[0, 4],
-    alone_failures=[0, 1],
+    alone_games=[{}, {"merge": 4}],
+    alone_failures=[{}, {"merge": 1}],
     regret=SCORES,
 )
 Tensors = dict[str, torch.Tensor]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from harness.config.training import Training
-from harness.training.early_stopping import LATEST, LEAST, MOST_FAILURES, Narrowing, has_converged, still_fails
+from harness.training.early_stopping import LATEST, LEAST, MOST_FAILURES, Narrowing, failing_roads, has_converged
 
 ZEROS, ONES = [0.0] * LATEST, [1.0] * LATEST
 NO_GAME = -math.inf
@@ -57,8 +57,15 @@ AT_THE_BOUND = round(MOST_FAILURES * 10)
         ([5, *[0] * LATEST], [5, *[0] * LATEST], False),  # without games alone nothing can be said
     ],
 )
-def test_still_fails__by_the_share_of_the_latest_segments(games: list[int], failures: list[int], fails: bool) -> None:
-    assert still_fails(games, failures) == fails
+def test_failing_roads__by_the_share_of_the_latest_segments(games: list[int], failures: list[int], fails: bool) -> None:
+    of_road = [[{"merge": count} for count in counts] for counts in (games, failures)]
+    assert failing_roads(*of_road) == (["merge"] if fails else [])
+
+
+def test_failing_roads__one_road_of_several_is_enough() -> None:
+    games = [{"merge": 90, "roundabout": 10}] * LATEST
+    failures = [{"roundabout": 9}] * LATEST
+    assert failing_roads(games, failures) == ["roundabout"]
 
 
 # --- the last part, in which actions become narrow --------------------------------------------------------------------

@@ -105,7 +105,7 @@ def test_train__a_continued_converged_training_stays_converged(
     alone: TrainingSpec, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(harness.training.ppo, "has_converged", lambda payoffs: len(payoffs) >= 2)
-    monkeypatch.setattr(harness.training.ppo, "still_fails", lambda games, failures: False)
+    monkeypatch.setattr(harness.training.ppo, "failing_roads", lambda games, failures: [])
     converged = in_one_go(alone, tmp_path)
     assert (converged.stopped, converged.progress.converged_at) == ("converged", 2048)
     assert converged.progress.steps == 2048 + 512  # a tenth of the budget more, in whole rollouts
@@ -148,7 +148,7 @@ def test_train__a_policy_trained_with_an_opponent_observes_it(
 def test_train__starts_from_the_initial_policy(
     alone: TrainingSpec, trained: TrainingResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    over = Progress(segments=1, steps=10**9, segment_payoffs=[0.0], curve=[], alone_games=[0], alone_failures=[0])
+    over = Progress(segments=1, steps=10**9, segment_payoffs=[0.0], curve=[], alone_games=[{}], alone_failures=[{}])
     monkeypatch.setattr(harness.training.ppo, "_segment", lambda *_, **__: over)
     warm = in_one_go(replace(alone, initial=trained.policy), tmp_path)
     for name, tensor in trained.policy.tensors.items():
@@ -185,7 +185,7 @@ def test_train__alone_share_is_the_share_of_games_without_opponent(
     tolerance = 0.15 if 0.0 < share < 1.0 else 0.0
     assert 1.0 - np.mean(present) == pytest.approx(share, abs=tolerance)
     ended = sum(window.games for window in progress.curve)
-    assert sum(progress.alone_games) / ended == pytest.approx(share, abs=tolerance)
+    assert sum(sum(each.values()) for each in progress.alone_games) / ended == pytest.approx(share, abs=tolerance)
 
 
 def samplings(monkeypatch: pytest.MonkeyPatch) -> list[StartDistribution]:
@@ -301,7 +301,10 @@ def test_train__a_flat_curve_of_failures_is_not_convergence(
     monkeypatch.setattr(harness.training.ppo, "has_converged", lambda payoffs: len(payoffs) >= 1)
     trained = in_one_go(alone, tmp_path)
     assert (trained.stopped, trained.progress.steps) == ("budget", 3072)
-    games, failures = trained.progress.alone_games, trained.progress.alone_failures
+    games, failures = (
+        [sum(each.values()) for each in counts]
+        for counts in (trained.progress.alone_games, trained.progress.alone_failures)
+    )
     assert sum(games) == sum(window.games for window in trained.progress.curve)  # it is alone in all of them
     assert sum(failures) > 0.5 * sum(games)
 

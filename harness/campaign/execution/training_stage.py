@@ -24,7 +24,7 @@ from harness.errors import StageFailed
 from harness.evaluation.tables import table_of, write_csv
 from harness.game.roles import EGO, ROLES
 from harness.road.scene.open_scene import OpenScene
-from harness.training.early_stopping import RULE
+from harness.training.early_stopping import RULE, failing_roads
 from harness.training.ppo import train
 from harness.training.training_games import LearningPlace, TrainingSpec
 
@@ -56,6 +56,9 @@ def carry_out_training(stage: TrainingStage, run: StageRun, scene: OpenScene) ->
         "rule": RULE if spec.settings.early_convergence else "",
         "versions": versions,
     }
+    failing = failing_roads(result.progress.alone_games, result.progress.alone_failures)
+    if further := [road for road in _roads(spec) if road in failing]:
+        facts["failing_roads"] = further
     write_policy(result.policy, folder.policy(stage.id))
     curve = pd.DataFrame([asdict(point) for point in result.progress.curve])
     ends = [*[""] * (len(curve) - 1), result.stopped][: len(curve)]  # the reason for the end is in the last row
@@ -102,6 +105,12 @@ def _places_on_roads(stage: TrainingStage, run: StageRun) -> Iterator[LearningPl
         yield from _places(stage, PlayerFactory(context=run.context, scene=road))
 
 
+def _roads(spec: TrainingSpec) -> list[str]:
+    """The further scenes on which it learns; each may have two places."""
+    names = dict.fromkeys(each.scene.document.name for each in spec.places)
+    return [name for name in names if name != spec.scene.document.name]
+
+
 def _persona_card(personas: tuple[Persona, ...]) -> dict[str, Any]:
     if len(personas) == 1:
         return {"persona": personas[0].name, "persona_sha256": persona_hash(personas[0])}
@@ -109,8 +118,7 @@ def _persona_card(personas: tuple[Persona, ...]) -> dict[str, Any]:
 
 
 def _policy_card(stage: TrainingStage, spec: TrainingSpec) -> dict[str, Any]:
-    names = dict.fromkeys(each.scene.document.name for each in spec.places)  # a road may have two places
-    roads = [name for name in names if name != spec.scene.document.name]
+    roads = _roads(spec)
     return {
         "stage": stage.id,
         "player": ROLES[stage.learner],

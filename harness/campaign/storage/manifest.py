@@ -66,6 +66,8 @@ class StageEntry(_Record):
     """The games of that arm that could be played."""
     goal_share_asked: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
     """Of a training: the least share of these games for its player to have learned."""
+    failing_roads: list[Text] = Field([])
+    """Of a training: the further scenes on which most of its last games alone failed."""
 
 
 class _ListedEgo(_Record):

@@ -35,7 +35,9 @@ def test_training__by_regret_is_given_the_naive_ego_and_its_table_has_the_regret
     window = CurvePoint(
         steps=8, mean_payoff=1.5, failure_rate=0.25, games=4, mean_duration_s=3.0, mean_regret=of_window
     )
-    progress = Progress(segments=1, steps=8, segment_payoffs=[1.5], curve=[window], alone_games=[1], alone_failures=[0])
+    progress = Progress(
+        segments=1, steps=8, segment_payoffs=[1.5], curve=[window], alone_games=[{"merge": 1}], alone_failures=[{}]
+    )
 
     def recording(spec: TrainingSpec, **options: Any) -> TrainingResult:
         specs.append(spec)

@@ -43,6 +43,16 @@ def test_judged__a_player_that_cannot_drive_did_not_learn_whatever_stopped_its_t
     assert did_not_learn(found) == {"anna-seed1": "alone it reaches its goal in 79 of 100 games (79 %), below 80 %"}
 
 
+def test_judged__an_ego_that_fails_on_a_further_road_did_not_learn() -> None:
+    document = campaign_of("anna")
+    before, goals = entries(document), {"naive_alone-seed1": Goals(goals=100, played=100)}
+    before["naive-seed1"]["failing_roads"] = ["roundabout"]
+    found = judged(before, document, plan(document, ["anna"]), goals)
+    assert found["naive-seed1"]["stopped"] == DID_NOT_LEARN
+    words = "at the end of its training most games alone fail on roundabout"
+    assert did_not_learn(found) == {"naive-seed1": words}
+
+
 def test_judged__by_the_bounds_of_the_campaign() -> None:
     goals = {"naive_alone-seed1": Goals(goals=0, played=100)}
     assert judge(goals, competence={"ego_goal_share": 0.0})["naive-seed1"]["stopped"] == "converged"
