@@ -1,6 +1,6 @@
 """How the shipped egos, by rules and learned on all scenes, and SUMO's driver come through all scenes.
 
-python docs/league/baselines.py play                   # their leagues and ranks: about half an hour on two cores
+python docs/league/baselines.py play                   # their leagues and ranks: about an hour on two cores
 python docs/league/baselines.py table reports/league   # the ranks as a Markdown table
 python docs/league/baselines.py scenes reports/league  # the games that each ego fails, by scene
 """
@@ -18,6 +18,7 @@ from harness.evaluation.comparisons.tied_ranks import with_shield
 from harness.evaluation.tables import read_csv
 
 RULES = ("sumo", "adas", "careful_and_competent", "fuzzy", "rss")
+SHIELDED = RULES[1:]  # SUMO's driver has no decision that a shield could check
 LEARNED = tuple(f"all-scenes/{ego}-seed{seed}" for ego in ("naive", "robust") for seed in (61, 62, 63))
 GAMES = 10
 FOLDER = Path("reports/league")
@@ -29,7 +30,7 @@ app = typer.Typer(no_args_is_help=True, add_completion=False)
 def play() -> None:
     """Play the league of each ego, with and without a shield, and rank them. Run it again to continue."""
     for ego in (*RULES, *LEARNED):
-        shield = () if ego == "sumo" else ("--shield", "rss")  # SUMO's driver has no decision to check
+        shield = ("--shield", "rss") if ego in SHIELDED else ()
         _run("league", "--ego", ego, *shield, "--episodes", GAMES, "--out", FOLDER / Path(ego).name)
     _run("league-table", FOLDER)
 
