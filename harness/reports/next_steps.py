@@ -100,7 +100,7 @@ def _widen(tables: RunTables) -> Iterator[NextStep]:
     ]
     if trained and not tables.personas:
         yield NextStep(
-            sentence="This ego has met no person. Play it against all people in all scenes.",
+            sentence="Play this ego against all people in all scenes.",
             command=f"harness league --ego policies/{trained[-1]}",
         )
     elif tables.acceptance is None:
