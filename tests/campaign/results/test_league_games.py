@@ -50,6 +50,15 @@ def test_rank_leagues__another_table_is_refused(tmp_path: Path) -> None:
         rank_leagues(tmp_path)
 
 
+def test_rank_leagues__the_same_games_of_one_ego_in_two_folders_are_refused(tmp_path: Path) -> None:
+    write_league(tmp_path, "a", "0 1 3")
+    write_league(tmp_path, "b", "0")
+    (tmp_path / "b").rename(tmp_path / "c")
+    write_league(tmp_path, "b", "0")
+    with pytest.raises(UsageError, match="b and c have the same games of an ego 'b'"):
+        rank_leagues(tmp_path)
+
+
 def test_rank_leagues__numbers_of_games_that_are_none_are_refused(tmp_path: Path) -> None:
     write_league(tmp_path, "a", "0")
     write_league(tmp_path, "b", "first")
