@@ -63,7 +63,7 @@ def seeds(folder: Folder) -> None:
             parts = {
                 "alone": known & (games["person"] == NOBODY),
                 "beside SUMO's driver": known & (games["person"] == SUMO_DRIVER),
-                "people whom the robust ego has met": known & of_person & of_met,
+                "people that the robust ego has met": known & of_person & of_met,
                 "other trainings of these people": known & of_person & ~of_met,
                 "all games of the other scenes": ~known,
             }

@@ -41,8 +41,8 @@ def test_seeds__tell_people_that_were_met_from_others(folder: Path, capsys: pyte
     tables.seeds(folder)
     lines = capsys.readouterr().out.splitlines()
     assert "| alone | robust | 0 of 10 | 0 of 10 | 0 of 10 |" in lines
-    assert "| people whom the robust ego has met | naive | 12 of 20 | 12 of 20 | 12 of 20 |" in lines
-    assert "| people whom the robust ego has met | robust | 0 of 20 | 0 of 20 | 0 of 20 |" in lines
+    assert "| people that the robust ego has met | naive | 12 of 20 | 12 of 20 | 12 of 20 |" in lines
+    assert "| people that the robust ego has met | robust | 0 of 20 | 0 of 20 | 0 of 20 |" in lines
     assert "| other trainings of these people | robust | 6 of 10 | 6 of 10 | 6 of 10 |" in lines
     assert "| all games of the other scenes | naive | 0 of 20 | 0 of 20 | 0 of 20 |" in lines
     assert lines[-1] == "| people, both egos | p (McNemar) | 0.00049 | 0.00049 | 0.00049 |"

@@ -106,6 +106,8 @@ def _personas(document: Campaign, personas: Sequence[str], traits: PersonTraits)
         for name in names:
             if name not in known:
                 yield key, f"there is no persona {name!r}", nearest(name, known)
+    for name in {SUMO, SHIPPED} & {*personas} & {*document.retraining.against}:
+        yield "retraining.against", f"{name!r} is the name of a persona, too", "give the persona another name"
     taken = [*personas, traits.baseline]
     mixed = [(f"population[{k}]", each.name) for k, each in enumerate(document.population)]
     mixed += [(f"crowd[{k}]", each.name) for k, each in enumerate(document.crowd)]

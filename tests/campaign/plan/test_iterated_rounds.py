@@ -296,6 +296,13 @@ def test_plan__a_population_is_met_as_a_persona_is(tmp_path: Path) -> None:
 # --- what can't be ---------------------------------------------------------------
 
 
+@pytest.mark.parametrize("name", ["sumo", "shipped"])
+def test_campaign__a_persona_with_the_name_of_other_drivers_is_refused(name: str, tmp_path: Path) -> None:
+    personas = [str(write_persona(tmp_path, name))]
+    with pytest.raises(UsageError, match=f"retraining.against: '{name}' is the name of a persona, too"):
+        open_campaign(write_campaign(tmp_path, personas=personas, retraining={"against": [name]}))
+
+
 @pytest.mark.parametrize(
     ("changes", "key", "words"),
     [
