@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import PurePath
 from typing import Any
 
 import pandas as pd
 
-from harness.campaign.plan.planned_drivers import Trained, TrainedBefore, members_of
+from harness.campaign.plan.planned_drivers import PlannedMember, Trained, TrainedBefore, members_of
 from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.storage.checksums import checksums_of, digest_of
 from harness.campaign.storage.manifest import campaign_in
@@ -32,27 +32,36 @@ def games_in(table: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame([game for row in table.to_dict("records") for game in _games_of(row)], columns=columns)
 
 
-def games_sha256(run: RunFolder, manifest: Mapping[str, Any], stage: AssessmentStage) -> str:
-    """The digest of what the games of an arm depend on beside the ego: the same for each training seed of the people
-    where no person is trained."""
-    hashes = {PurePath(file): sha256 for file, sha256 in manifest["hashes"].items()}
-    policies = []
-    for driver in members_of(*stage.non_ego):
+def games_sha256(
+    run: RunFolder, manifest: Mapping[str, Any], stages: Iterable[AssessmentStage]
+) -> dict[tuple[str, int], str]:
+    """The digest of what the games of each arm depend on beside the ego, by its name and training seed: the same for
+    each training seed of the people where no person is trained."""
+    scene, start_seed = checksums_of(run.scene, sorted(run.scene.iterdir())), campaign_in(manifest).start_seed
+    read: dict[str, dict[str, str]] = {}
+    for file, sha256 in manifest["hashes"].items():
+        read.setdefault(PurePath(file).parent.name, {})[PurePath(file).name] = sha256
+
+    def policy(driver: PlannedMember) -> Mapping[str, Any]:
         match driver:
             case Trained(stage=name):  # a policy of several personas, from which this run derived the person's
-                policies.append(checksums_of(run.policy(name), policy_files(run.policy(name))))
+                return checksums_of(run.policy(name), policy_files(run.policy(name)))
             case TrainedBefore(stage=name):
-                policies.append({file.name: sha256 for file, sha256 in hashes.items() if file.parent.name == name})
+                return read.get(name, {})
             case _:
-                policies.append({})
-    return digest_of(
-        {
-            "scene": checksums_of(run.scene, sorted(run.scene.iterdir())),
-            "start_seed": campaign_in(manifest).start_seed,
-            "persona": manifest["persona_documents"].get(stage.persona),
-            "policies": policies,
-        }
-    )
+                return {}
+
+    return {
+        (stage.name, stage.seed): digest_of(
+            {
+                "scene": scene,
+                "start_seed": start_seed,
+                "persona": manifest["persona_documents"].get(stage.persona),
+                "policies": [policy(each) for each in members_of(*stage.non_ego)],
+            }
+        )
+        for stage in stages
+    }
 
 
 def _games_of(row: Mapping[str, Any]) -> Iterator[dict[str, Any]]:

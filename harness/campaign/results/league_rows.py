@@ -79,7 +79,7 @@ def _rows(ego: str, run: RunFolder, games: dict[tuple[str, str, int], str]) -> I
     scene, campaign = scene_of(manifest), campaign_in(manifest)
     plan = planned(manifest)
     arms = arms_of(plan)
-    stages = {(each.name, each.seed): each for each in plan if isinstance(each, AssessmentStage)}
+    digests = games_sha256(run, manifest, [each for each in plan if isinstance(each, AssessmentStage)])
     file = run.path / "preventability.csv"
     prevented = read_csv(file) if file.is_file() else None
     page = (run.path / "report.html").read_text(encoding="utf-8")
@@ -97,7 +97,7 @@ def _rows(ego: str, run: RunFolder, games: dict[tuple[str, str, int], str]) -> I
         cells |= {"serious_injuries": played["mais3_risk_high"].sum() / len(played) if len(played) else np.nan}
         cells |= rate_cells("hard_brake_rate", hard, len(played))
         cells["reason"] = "" if person == NOBODY else gate(alone_bounds(campaign, arms[arm]), seed, games_of)["reason"]
-        cells |= outcome_cells(of_arm) | {"games_sha256": games_sha256(run, manifest, stages[arm, seed])}
+        cells |= outcome_cells(of_arm) | {"games_sha256": digests[arm, seed]}
         of_regulation = [] if prevented is None else by_regulation(prevented[prevented["seed"] == seed], arm)
         for end in ("", "_low", "_high"):
             cells[f"preventable_rate{end}"] = of_regulation[0][f"from_start_rate{end}"] if of_regulation else np.nan
