@@ -11,8 +11,9 @@ A human driver would not have followed a course that reacts to nothing either: t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -27,10 +28,17 @@ from harness.assessment.recorded_courses import (
 )
 from harness.drivers.car import Car, car_of
 from harness.drivers.protocol import Driver
-from harness.drivers.reference_drivers import REFERENCES, FullBraking, lane_width_of, reference_driver
+from harness.drivers.reference_drivers import (
+    REFERENCES,
+    FullBraking,
+    ReferenceDriver,
+    lane_width_of,
+    reference_driver,
+)
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
-from harness.game.arrays import BoolArray, FloatArray, IntArray
+from harness.environments.seats import taken_over
+from harness.game.arrays import FloatArray, IntArray
 from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.observation import observe
@@ -69,6 +77,16 @@ class Takeover:
         return self.course is not None
 
 
+class _Replays(NamedTuple):
+    """Replays in which a driver takes over, [N] each."""
+
+    games: IntArray
+    """The collision, by its number."""
+    first_steps: IntArray
+    drivers: IntArray
+    """The driver, by its number."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Chance:
     """The first and the last step from which full braking prevents a collision; None: it does from no step."""
@@ -96,8 +114,19 @@ class ConflictReplay:
         """How each of `REFERENCES` fares in each collision."""
         if not self._collisions:
             return {name: [] for name in REFERENCES}
+        drivers = [reference_driver(name, self._car, self._lane_width_m) for name in REFERENCES]
         observations = self._observed()
-        return {name: self._takeovers_of(name, observations) for name in REFERENCES}
+        danger_steps = np.array([self._danger_steps(each, observations) for each in drivers])
+        of_driver, games = np.nonzero(danger_steps != _NEVER)
+        found = self._courses(_Replays(games, danger_steps[of_driver, games], of_driver), drivers)
+        courses = dict(zip(zip(of_driver.tolist(), games.tolist(), strict=True), found, strict=True))
+        return {
+            name: [
+                Takeover(danger_step=None if step == _NEVER else step, course=courses.get((driver, game)))
+                for game, step in enumerate(danger_steps[driver].tolist())
+            ]
+            for driver, name in enumerate(REFERENCES)
+        }
 
     def chances(self) -> list[Chance]:
         """The first and last step from which full braking prevents each collision: searched on a grid of `_GRID_S`,
@@ -105,76 +134,61 @@ class ConflictReplay:
         if not self._collisions:
             return []
         spacing = max(round(_GRID_S / self._scene.world.step_s), 1)
-        grids = [list(range(0, each.course.failed_step, spacing)) for each in self._collisions]
-        games = np.repeat(np.arange(len(grids)), [len(grid) for grid in grids])
-        steps = np.concatenate([np.array(grid, dtype=np.int64) for grid in grids])
-        avoids = self._prevented(games, steps)
-        found = np.unique(games[avoids])
-        good = [steps[(games == game) & avoids] for game in found]
-        first, last = (np.array([end(each) for each in good], dtype=np.int64) for end in (np.min, np.max))
-        ends = np.array([self._collisions[game].course.failed_step for game in found], dtype=np.int64)
-        first_steps = self._boundary(found, good=first, bad=np.maximum(first - spacing, -1))
-        last_steps = self._boundary(found, good=last, bad=np.minimum(last + spacing, ends))
-        chances = [Chance(first_step=None, last_step=None)] * len(grids)
-        for game, begin, end in zip(found.tolist(), first_steps.tolist(), last_steps.tolist(), strict=True):
-            chances[game] = Chance(first_step=begin, last_step=end)
+        ends = [each.course.failed_step for each in self._collisions]
+        grid = [(game, step) for game, end in enumerate(ends) for step in range(0, end, spacing)]
+        avoids = self._prevented(grid)
+        good = [[step for step in range(0, end, spacing) if avoids[game, step]] for game, end in enumerate(ends)]
+        found = [game for game, steps in enumerate(good) if steps]
+        # each search: the collision, a step from which braking prevents it, and one from which it may not
+        firsts = [(game, good[game][0], max(good[game][0] - spacing, -1)) for game in found]
+        lasts = [(game, good[game][-1], min(good[game][-1] + spacing, ends[game])) for game in found]
+        between = [(game, step) for game, a, b in firsts + lasts for step in range(min(a, b) + 1, max(a, b))]
+        avoids |= self._prevented(between)
+        chances = [Chance(first_step=None, last_step=None)] * len(ends)
+        for first, last in zip(firsts, lasts, strict=True):
+            chances[first[0]] = Chance(first_step=_boundary(avoids, *first), last_step=_boundary(avoids, *last))
         return chances
 
-    def _boundary(self, games: IntArray, good: IntArray, bad: IntArray) -> IntArray:
-        """[N] the step nearest to `bad` from which full braking prevents the collision, by bisection from `good`."""
-        good, bad = good.copy(), bad.copy()
-        while len(open_ := np.flatnonzero(np.abs(good - bad) > 1)):
-            middle = (good[open_] + bad[open_]) // 2
-            avoids = self._prevented(games[open_], middle)
-            good[open_[avoids]], bad[open_[~avoids]] = middle[avoids], middle[~avoids]
-        return good
+    def _prevented(self, braked: Sequence[tuple[int, int]]) -> dict[tuple[int, int], bool]:
+        """Whether full braking from a step on prevents a collision, by its number and the step."""
+        games, steps = np.array(braked, dtype=np.int64).reshape(-1, 2).T
+        courses = self._courses(_Replays(games, steps, np.zeros_like(games)), [FullBraking(self._car)])
+        return {key: course is not None for key, course in zip(braked, courses, strict=True)}
 
-    def _takeovers_of(self, name: str, observations: FloatArray) -> list[Takeover]:
-        """How one reference driver fares, given the ego's observations [T, N, SIZE] of its opponent alone."""
-        driver = reference_driver(name, self._car, self._lane_width_m)
+    def _danger_steps(self, driver: ReferenceDriver, observations: FloatArray) -> IntArray:
+        """[N] the first step in which a driver's rule says danger, given the ego's observations [T, N, SIZE] of its
+        opponent alone; _NEVER if it does in none before the collision."""
         steps, games, size = observations.shape
         danger = driver.sees_danger(observations.reshape(-1, size)).reshape(steps, games)
         ends = np.array([each.course.failed_step for each in self._collisions])
         danger &= np.arange(steps)[:, None] < ends
-        first = np.where(danger.any(axis=0), danger.argmax(axis=0), _NEVER)
-        taken = np.flatnonzero(first != _NEVER)
-        courses = dict(zip(taken.tolist(), self._courses(taken, first[taken], driver), strict=True))
-        return [
-            Takeover(danger_step=None if step == _NEVER else step, course=courses.get(game))
-            for game, step in enumerate(first.tolist())
-        ]
+        return np.where(danger.any(axis=0), danger.argmax(axis=0), _NEVER)
 
     def _observed(self) -> FloatArray:
         """[T, N, SIZE] what the ego sees of its opponent in each step of each collision; T is that of the longest."""
+        games = np.arange(len(self._collisions))
         replays = [CourseReplay(course=each.course, only_opponent=True) for each in self._collisions]
-        arena = self._taken_over(range(len(replays)), replays, [SumoDriver()] * len(self._scene.world.roles))
+        arena = self._taken_over(_Replays(games, np.zeros_like(games), np.zeros_like(games)), replays, [SumoDriver()])
         observations = [arena.observation[:, EGO].copy()]
         for _ in range(max(each.course.failed_step for each in self._collisions)):
             arena.step()
             observations.append(arena.observation[:, EGO].copy())
         return np.array(observations)
 
-    def _prevented(self, games: IntArray, steps: IntArray) -> BoolArray:
-        """[N] whether full braking from `steps` [N] on prevents the collisions `games` [N]."""
-        courses = self._courses(games, steps, FullBraking(self._car))
-        return np.array([course is not None for course in courses], dtype=bool)
-
-    def _courses(self, games: IntArray, steps: IntArray, driver: Driver) -> list[FloatArray | None]:
-        """The course of a driver that takes over in each of the collisions `games` [N] in `steps` [N], as
-        `Takeover.course`."""
+    def _courses(self, played: _Replays, drivers: Sequence[Driver]) -> list[FloatArray | None]:
+        """The course of the driver in each replay, as `Takeover.course`."""
         courses: list[FloatArray | None] = []
-        for first in range(0, len(games), _GAMES_AT_ONCE):
+        for first in range(0, len(played.games), _GAMES_AT_ONCE):
             part = slice(first, first + _GAMES_AT_ONCE)
-            courses += self._courses_at_once(games[part], steps[part], driver)
+            courses += self._courses_at_once(_Replays(*(column[part] for column in played)), drivers)
         return courses
 
-    def _courses_at_once(self, games: IntArray, steps: IntArray, driver: Driver) -> list[FloatArray | None]:
+    def _courses_at_once(self, played: _Replays, drivers: Sequence[Driver]) -> list[FloatArray | None]:
         replays = [
             CourseReplay(course=self._collisions[game].course, first_step=step, without_followers=True)
-            for game, step in zip(games.tolist(), steps.tolist(), strict=True)
+            for game, step in zip(played.games.tolist(), played.first_steps.tolist(), strict=True)
         ]
-        people = len(self._scene.world.roles) - 1
-        arena = self._taken_over(games.tolist(), replays, [driver, *[SumoDriver()] * people])
+        arena = self._taken_over(played, replays, drivers)
         lengths = np.array([len(each.course.players) - 1 - each.first_step for each in replays])
         prevented = np.ones(len(replays), dtype=bool)
         poses = [_poses_of_ego(arena)]
@@ -186,26 +200,35 @@ class ConflictReplay:
         driven = np.stack(poses, axis=1)  # [N, T, 3]
         return [driven[row, : lengths[row] + 1] if avoided else None for row, avoided in enumerate(prevented.tolist())]
 
-    def _taken_over(self, games: Sequence[int], replays: Sequence[CourseReplay], drivers: Sequence[Driver]) -> Arena:
-        """An arena at the first step of each replay of the collisions `games` [N], with the ego's recorded acceleration
-        and steering. Seats of SUMO repeat the recording, also those of pedestrians."""
-        simulation = RecordedCourses(replays, [each.takes_over for each in drivers])
-        arena = Arena(self._scene, len(replays), [Seat(each) for each in drivers], simulation=simulation)
-        arena.reset(
-            {row: self._start(game, replay) for row, (game, replay) in enumerate(zip(games, replays, strict=True))}
-        )
+    def _taken_over(self, played: _Replays, replays: Sequence[CourseReplay], drivers: Sequence[Driver]) -> Arena:
+        """An arena at the first step of each replay, with the ego's recorded acceleration and steering. Seats of SUMO
+        repeat the recording, also those of pedestrians."""
+        people = [(Seat(SumoDriver()),)] * (len(self._scene.world.roles) - 1)
+        seats = [tuple(map(Seat, drivers)), *people]
+        simulation = RecordedCourses(replays, taken_over(seats))
+        arena = Arena(self._scene, len(replays), seats, simulation=simulation)
+        rows = zip(played.games.tolist(), replays, played.drivers.tolist(), strict=True)
+        arena.reset({row: self._start(*of_row) for row, of_row in enumerate(rows)})
         for row, each in enumerate(replays):
             arena.state.acceleration_mps2[row, EGO] = each.course.ego_acceleration_mps2[each.first_step]
             arena.state.steering_rad[row, EGO] = each.course.ego_steering_rad[each.first_step]
         arena.observation[:] = observe(arena.first_quantities(np.arange(len(replays))))
         return arena
 
-    def _start(self, game: int, replay: CourseReplay) -> InitialState:
+    def _start(self, game: int, replay: CourseReplay, driver: int) -> InitialState:
         """The state in which a replay begins; its road is as slippery as in the recorded game."""
         present = [1.0] * len(self._scene.world.roles)
         distribution = self._scene.start_distribution([HumanFactors()] * len(present), present)
         drawn = draw_initial_state(distribution, *parts_of(self._seed, self._collisions[game].episode))
-        return start_of(replay, drawn)
+        return replace(start_of(replay, drawn), member=(driver, *drawn.member[1:]))
+
+
+def _boundary(avoids: Mapping[tuple[int, int], bool], game: int, good: int, bad: int) -> int:
+    """The step nearest to `bad` from which full braking prevents a collision, by bisection from `good`."""
+    while abs(good - bad) > 1:
+        middle = (good + bad) // 2
+        good, bad = (middle, bad) if avoids[game, middle] else (good, middle)
+    return good
 
 
 def _poses_of_ego(arena: Arena) -> FloatArray:

@@ -157,24 +157,30 @@ class RecordedCourses:
 
     def __init__(self, replays: Sequence[CourseReplay], taken_over: Sequence[bool]) -> None:
         self._replays, self._taken_over = replays, np.array(taken_over)
-        self._clock = np.array([each.first_step for each in replays])
-        most = max(each.course.others.shape[1] for each in replays)
-        self._shown = np.zeros((len(replays), most), dtype=bool)
-        self._sizes_m = np.zeros((len(replays), most, 2))
-        for game, replay in enumerate(replays):
-            shown = _shown(replay)
-            self._shown[game, : len(shown)] = shown
-            self._sizes_m[game, : len(shown)] = replay.course.others_size_m
+        courses = list({id(each.course): each.course for each in replays}.values())
+        most = max(each.others.shape[1] for each in courses)
+        # the steps of all courses, one below the other
+        self._players = np.concatenate([each.players for each in courses])
+        self._signals = np.concatenate([each.signals for each in courses])
+        self._others = np.concatenate([_widened(each.others, most) for each in courses])
+        self._others_present = np.concatenate([_widened(each.others_present, most) for each in courses])
+        ends = np.cumsum([len(each.players) for each in courses])
+        row_of = {
+            id(each): (end - len(each.players), end - 1) for each, end in zip(courses, ends.tolist(), strict=True)
+        }
+        self._first_row, self._last_row = np.array([row_of[id(each.course)] for each in replays]).T
+        self._row = self._first_row + [each.first_step for each in replays]
+        self._shown = np.array([_widened(_shown(each)[None], most)[0] for each in replays])
+        self._sizes_m = np.array([_widened(each.course.others_size_m[None], most)[0] for each in replays])
 
     def reload(self, seed: int) -> None:
         """Do nothing: a recording has no random numbers."""
 
     def reset(self, game: int, start: InitialState, departures: list[Departure]) -> AtReset:
         """Begin a game at its first step."""
-        replay = self._replays[game]
-        self._clock[game] = replay.first_step
-        states = replay.course.signals[replay.first_step]
-        return AtReset(states, np.zeros(len(states)), "", self._background([game]))
+        self._row[game] = self._first_row[game] + self._replays[game].first_step
+        states = self._signals[self._row[game]]
+        return AtReset(states, np.zeros(len(states)), "", self._background(slice(game, game + 1)))
 
     def halt(self, game: int, player: int) -> None:
         """Do nothing: the arena keeps a player that has ended in its place."""
@@ -187,13 +193,11 @@ class RecordedCourses:
 
     def step(self) -> Reading:
         """Advance all games by one step; at the end of a course its last step is repeated."""
-        last = np.array([len(each.course.players) - 1 for each in self._replays])
-        self._clock = np.minimum(self._clock + 1, last)
-        reading = self._background(range(len(self._replays)))
-        now = [(each.course, step) for each, step in zip(self._replays, self._clock.tolist(), strict=True)]
-        reading.players = np.stack([course.players[step] for course, step in now])
+        self._row = np.minimum(self._row + 1, self._last_row)
+        reading = self._background(slice(None))
+        reading.players = self._players[self._row]
         reading.players[:, self._taken_over] = np.nan
-        reading.signals = np.stack([course.signals[step] for course, step in now])
+        reading.signals = self._signals[self._row]
         return reading
 
     def turn_signals(self, vehicles: Sequence[tuple[int, str]]) -> list[str]:
@@ -203,19 +207,19 @@ class RecordedCourses:
     def close(self) -> None:
         """Do nothing."""
 
-    def _background(self, games: Sequence[int]) -> Reading:
+    def _background(self, games: slice) -> Reading:
         """The other vehicles of some games now, [N, M]."""
-        shape = (len(games), self._shown.shape[1])
-        poses, present = np.zeros((*shape, len(_POSE))), np.zeros(shape, dtype=bool)
-        for row, game in enumerate(games):
-            course, step = self._replays[game].course, self._clock[game]
-            count = course.others.shape[1]
-            poses[row, :count], present[row, :count] = course.others[step], course.others_present[step]
-        names = np.full(shape, "", dtype=object)
-        length_m, width_m = np.moveaxis(self._sizes_m[list(games)], -1, 0)
-        x_m, y_m, heading_rad, speed_mps = np.moveaxis(poses, -1, 0)
-        shown = present & self._shown[list(games)]
+        rows = self._row[games]
+        x_m, y_m, heading_rad, speed_mps = np.moveaxis(self._others[rows], -1, 0)
+        length_m, width_m = np.moveaxis(self._sizes_m[games], -1, 0)
+        shown = self._others_present[rows] & self._shown[games]
+        names = np.full(shown.shape, "", dtype=object)
         return Reading(names, names, x_m, y_m, heading_rad, speed_mps, length_m, width_m, shown)
+
+
+def _widened(values: np.ndarray, most: int) -> np.ndarray:
+    """[T, most, ...] values [T, B, ...] of others, with zeros for those that a course has not."""
+    return np.pad(values, ((0, 0), (0, most - values.shape[1]), *[(0, 0)] * (values.ndim - 2)))
 
 
 def _shown(replay: CourseReplay) -> BoolArray:

@@ -21,7 +21,7 @@ import pandas as pd
 
 from harness.assessment.game_traces import GameTraces
 from harness.assessment.seated_arm import SeatedArm
-from harness.drivers.mixture import Mixture, factors_of, shares_of
+from harness.drivers.mixture import factors_of, shares_of
 from harness.drivers.side_by_side import side_by_side
 from harness.environments.arena import Arena
 from harness.environments.recorded import recorded_game
@@ -112,7 +112,7 @@ class _Rollout:
         self._arm, self._on_start, self._start_from = arm, on_start, start_from
         factors, shares = [factors_of(each) for each in arm.drivers], [shares_of(each) for each in arm.drivers]
         self._starts = arm.scene.start_distribution(factors, [1.0] * len(factors), shares)
-        self._apart = _drivers_apart(arm)
+        self._together = _for_games_together(arm)
         self._alone: Arena | None = None
 
     def __enter__(self) -> _Rollout:
@@ -128,7 +128,7 @@ class _Rollout:
         try:
             arena, start = self._open_alone(), self._start(episode)
             arena.reload(start.seed)
-            (game,) = self._play(arena, {episode: start}).values()
+            (game,) = self._play(self._arm, arena, {episode: start}).values()
         except Exception as error:  # a driver may raise any exception: the other games are played
             if isinstance(error, MemoryError) or is_of_disk(error):
                 raise
@@ -137,24 +137,24 @@ class _Rollout:
 
     def play_together(self, episodes: Sequence[int]) -> dict[int, Game]:
         """Play those of the games that can be played side by side. Empty if one of them ends with an error."""
-        if self._apart is None or len(episodes) < 2:
+        arm = self._together
+        if arm is None or len(episodes) < 2:
             return {}
         starts = {episode: self._start(episode) for episode in episodes}
         self._close_alone()
         for episode in starts:
             self._on_start(episode)
         try:
-            seats = [seats_of(each, paid=True) for each in self._apart]
-            with closing(Arena(self._arm.scene, _tiles(len(starts)), seats, recorded=True)) as arena:
-                return self._play(arena, starts)
+            with closing(_arena(arm, _tiles(len(starts)))) as arena:
+                return self._play(arm, arena, starts)
         except Exception as error:
             if isinstance(error, MemoryError) or is_of_disk(error):
                 raise
             return {}
 
-    def _play(self, arena: Arena, starts: Mapping[int, InitialState]) -> dict[int, Game]:
-        """Play games from their starts, as many at a time as the arena has tiles."""
-        traces, waiting = GameTraces(self._arm, arena), deque(starts)
+    def _play(self, arm: SeatedArm, arena: Arena, starts: Mapping[int, InitialState]) -> dict[int, Game]:
+        """Play games from their starts, as many at a time as the arena has tiles, with the drivers of `arm`."""
+        traces, waiting = GameTraces(arm, arena), deque(starts)
         free, episode_of, played = list(range(arena.games)), dict[int, int](), dict[int, Game]()
         while waiting or episode_of:
             begun = [free.pop() for _ in range(min(len(free), len(waiting)))]
@@ -193,14 +193,17 @@ class _Rollout:
 
     def _open_alone(self) -> Arena:
         if self._alone is None:
-            seats = [seats_of(each, paid=True) for each in self._arm.drivers]
-            self._alone = Arena(self._arm.scene, 1, seats, recorded=True)
+            self._alone = _arena(self._arm, 1)
         return self._alone
 
     def _close_alone(self) -> None:
         if self._alone is not None:
             self._alone.close()
         self._alone = None
+
+
+def _arena(arm: SeatedArm, games: int) -> Arena:
+    return Arena(arm.scene, games, [seats_of(each, paid=True) for each in arm.drivers], recorded=True)
 
 
 def _tiles(games: int) -> int:
@@ -210,12 +213,13 @@ def _tiles(games: int) -> int:
 
 def plays_side_by_side(arm: SeatedArm) -> bool:
     """Whether games of an arm may be played side by side."""
-    return _drivers_apart(arm) is not None
+    return _for_games_together(arm) is not None
 
 
-def _drivers_apart(arm: SeatedArm) -> tuple[Mixture | None, ...] | None:
-    """[P] the drivers for games side by side; None if they or SUMO's traffic prevent such games."""
-    return None if arm.scene.has_background_traffic else side_by_side(arm.drivers, arm.scene.world.walks)
+def _for_games_together(arm: SeatedArm) -> SeatedArm | None:
+    """The arm with drivers for games side by side; None if its drivers or SUMO's traffic prevent such games."""
+    drivers = None if arm.scene.has_background_traffic else side_by_side(arm.drivers, arm.scene.world.walks)
+    return replace(arm, drivers=drivers) if drivers is not None else None
 
 
 def _failed(arm: SeatedArm, episode: int, error: str) -> Game:

@@ -29,13 +29,17 @@ class ShieldedDriver:
 
     def __init__(self, driver: Driver, world: World) -> None:
         """The driver is that of the ego in this world."""
-        self._car = car_of(world, EGO)
+        self._world, self._car = world, car_of(world, EGO)
         self.wrapped = driver
         """The driver behind the shield."""
         self._rule = reference_driver("rss", self._car, lane_width_of(world))
         self._braking_mps2 = Rss().full_braking_g * GRAVITY_MPS2
         self.intervenes: BoolArray = np.zeros(0, dtype=bool)
         """By game: whether its last decision was changed."""
+
+    def around(self, driver: Driver) -> ShieldedDriver:
+        """The same shield around another driver."""
+        return ShieldedDriver(driver, self._world)
 
     def reset(self, games: IntArray) -> None:
         """Reset games [N] of the driver; nothing has been changed in them."""

@@ -19,10 +19,8 @@ from harness.drivers.policy_file import LearnedDriver
 from harness.drivers.protocol import Driver
 from harness.drivers.reference_drivers import StrongestBraking
 from harness.drivers.rules_driver import RulesDriver
+from harness.drivers.shield import ShieldedDriver
 from harness.game.arrays import BoolArray, FloatArray, IntArray
-
-_BY_RULES = (RulesDriver, StrongestBraking, OrdinaryWalker)
-_NETWORKS = (LearnedDriver, NetworkDriver)  # they keep no state
 
 
 def side_by_side(players: Sequence[Mixture | None], walks: BoolArray) -> tuple[Mixture | None, ...] | None:
@@ -31,13 +29,26 @@ def side_by_side(players: Sequence[Mixture | None], walks: BoolArray) -> tuple[M
     found = list[Mixture | None]()
     for player, on_foot in zip(players, walks.tolist(), strict=True):
         members = player.members if player is not None else ()
-        drivers = [each.driver for each in members]
-        if not all(isinstance(each, (*_BY_RULES, *_NETWORKS)) or (on_foot and not each.takes_over) for each in drivers):
+        drivers = [_apart(each.driver, on_foot=on_foot) for each in members]
+        if None in drivers:
             return None
-        apart = [_OneByOne(each) if isinstance(each, _NETWORKS) else each for each in drivers]
-        changed = tuple(replace(member, driver=driver) for member, driver in zip(members, apart, strict=True))
-        found.append(Mixture(changed) if changed else None)
+        changed = (replace(each, driver=driver) for each, driver in zip(members, drivers, strict=True) if driver)
+        found.append(Mixture(tuple(changed)) if members else None)
     return tuple(found)
+
+
+def _apart(driver: Driver, *, on_foot: bool) -> Driver | None:
+    """A driver for games side by side; None if it can't play such games."""
+    match driver:
+        case ShieldedDriver():
+            wrapped = _apart(driver.wrapped, on_foot=on_foot)
+            return driver.around(wrapped) if wrapped is not None else None
+        case LearnedDriver() | NetworkDriver():  # they keep no state
+            return _OneByOne(driver)
+        case RulesDriver() | StrongestBraking() | OrdinaryWalker():
+            return driver
+        case _:
+            return driver if on_foot and not driver.takes_over else None
 
 
 class _OneByOne:

@@ -18,6 +18,7 @@ from harness.config.toml_reading import read_document
 from harness.drivers.car import car_of
 from harness.drivers.policy_file import LearnedDriver
 from harness.drivers.reference_drivers import UPPER_BOUND, reference_driver
+from harness.drivers.shield import ShieldedDriver
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Step
 from harness.errors import SimulationError
@@ -141,6 +142,17 @@ def test_batch__has_the_bytes_of_games_alone_with_perception_errors() -> None:
     assert any(others)  # a game may end before an error matters
 
 
+@pytest.mark.parametrize("ego", [RANDOM, "upper bound"])
+def test_batch__has_the_bytes_of_games_alone_with_a_shield(merge: OpenScene, ego: LearnedDriver | str) -> None:
+    driver = reference_driver(UPPER_BOUND, car_of(merge.world, 0), 3.5) if isinstance(ego, str) else ego
+    assessed = arm(merge, ShieldedDriver(driver, merge.world), RANDOM)
+    alone = side_by_side(assessed, *([episode] for episode in range(6)))
+    assert plays_side_by_side(assessed)
+    assert side_by_side(assessed, [0, 1, 2, 3], [5, 4]) == [*alone[:4], alone[5], alone[4]]
+    if driver is RANDOM:
+        assert any(trace(game)["shielded"].any() for game in play(assessed, 6))
+
+
 @pytest.mark.parametrize("scene", ["paper_merge", "merge"])
 def test_batch__of_more_games_than_tiles(scene: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A tile plays one game after the other, with a follower or without, and stands still at the end."""
@@ -152,6 +164,7 @@ def test_batch__of_more_games_than_tiles(scene: str, monkeypatch: pytest.MonkeyP
 
 def test_batch__drivers_of_others_and_sumo_play_alone(merge: OpenScene) -> None:
     assert not plays_side_by_side(arm(merge, Steady(), RANDOM))
+    assert not plays_side_by_side(arm(merge, ShieldedDriver(Steady(), merge.world), RANDOM))
     assert not plays_side_by_side(arm(merge, RANDOM, SumoDriver()))
     assert plays_side_by_side(arm(open_scene("zebra"), RANDOM, SumoDriver()))  # an ordinary walker
 

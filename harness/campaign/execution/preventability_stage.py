@@ -38,7 +38,7 @@ from harness.files import make_folder
 from harness.game.roles import EGO, NON_EGO
 from harness.road.scene.open_scene import OpenScene
 
-_COLLISIONS_AT_ONCE = 100  # what the ego sees in each of their steps is kept in memory
+_COLLISIONS_AT_ONCE = 50  # what the ego sees in each of their steps is kept in memory
 
 
 def carry_out_preventability(
@@ -101,12 +101,11 @@ def _from_conflict(
     cells: dict[tuple[int, str], dict[str, Any]] = {}
     courses: dict[int, list[dict[str, Any]]] = {}
     for first in range(0, len(collisions[Continuation.IN_ITS_PLACE]), _COLLISIONS_AT_ONCE):
-        part = slice(first, first + _COLLISIONS_AT_ONCE)
-        in_place, moving = (ConflictReplay(scene, collisions[each][part], start_seed) for each in Continuation)
-        chances, over = moving.chances(), moving.takeovers()
-        for name, takeovers in in_place.takeovers().items():
-            some = collisions[Continuation.IN_ITS_PLACE][part]
-            for collision, takeover, worse, chance in zip(some, takeovers, over[name], chances, strict=True):
+        in_place, moving = (found[first : first + _COLLISIONS_AT_ONCE] for found in collisions.values())
+        chances = ConflictReplay(scene, moving, start_seed).chances()
+        for name, takeovers in ConflictReplay(scene, [*in_place, *moving], start_seed).takeovers().items():
+            staying, over = takeovers[: len(in_place)], takeovers[len(in_place) :]
+            for collision, takeover, worse, chance in zip(in_place, staying, over, chances, strict=True):
                 steps = {
                     "conflict_s": takeover.danger_step,
                     "preventable_from_s": chance.first_step,
