@@ -10,6 +10,8 @@ from harness.assessment.rollout import assess_batches
 from harness.assessment.seated_arm import SeatedArm
 from harness.drivers.mixture import mixture_of
 from harness.drivers.policy_file import LearnedDriver
+from harness.drivers.protocol import Driver
+from harness.drivers.shield import ShieldedDriver
 from harness.drivers.sumo import SumoDriver
 from harness.road.scene.open_scene import open_scene
 
@@ -19,15 +21,21 @@ _SCENES = ("paper_merge", "merge", "left_across", "zebra")
 
 
 def assessment_table() -> str:
-    """In Markdown, for some scenes: the games per second of two learned drivers and of a learned ego among SUMO's
-    drivers, traces included and metrics not. The best of several turns counts."""
+    """In Markdown, for some scenes: the games per second of two learned drivers, without and with a shield around the
+    ego, and of a learned ego among SUMO's drivers, with traces and without metrics. The best of several turns counts.
+    """
     lines = ["| scene | against | alone | side by side | ratio |", "| --- | --- | ---: | ---: | ---: |"]
     for name in _SCENES:
         scene = open_scene(REPOSITORY / "networks" / name)
         people = len(scene.world.roles) - 1
         learned = LearnedDriver(coasting_policy(), sampled=False)
-        for against, driver in (("a learned person", learned), ("SUMO", SumoDriver())):
-            players = (mixture_of(learned, persona("careful")), *[mixture_of(driver, persona("speedy"))] * people)
+        pairings: list[tuple[str, Driver, Driver]] = [
+            ("a learned person", learned, learned),
+            ("a learned person, with a shield", ShieldedDriver(learned, scene.world), learned),
+            ("SUMO", learned, SumoDriver()),
+        ]
+        for against, ego, driver in pairings:
+            players = (mixture_of(ego, persona("careful")), *[mixture_of(driver, persona("speedy"))] * people)
             arm = SeatedArm(name="benchmark", scene=scene, drivers=players, seed=1)
             alone, together = [[episode] for episode in range(_GAMES)], [range(_GAMES)]
             turns = [(_games_per_s(arm, alone), _games_per_s(arm, together)) for _ in range(_TURNS)]
