@@ -4,14 +4,15 @@ A point of the unit cube has a share, from 0 to 1, of the scene's range for each
 player's speed. If SUMO drives a person, the parameters of its driver follow (`game.ordinary_driver`). Everything else
 of a game is drawn as in an assessment: lapses, decisions, weather, background traffic.
 
-A search is a generator of points, which is sent the loss of each. The loss is the ego's least time to collision, and 0
-where the ego fails. These are the usual searchers of falsification, without a model of the ego (A. Corso et al., "A
-Survey of Algorithms for Black-Box Safety Validation of Cyber-Physical Systems", JAIR 72, 2021).
+A search is a generator of generations of points, which is sent the losses of each. The games of a generation are played
+side by side where those of an assessment are. The loss is the ego's least time to collision, and 0 where the ego fails.
+These are the usual searchers of falsification, without a model of the ego (A. Corso et al., "A Survey of Algorithms for
+Black-Box Safety Validation of Cyber-Physical Systems", JAIR 72, 2021).
 """
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import replace
 from enum import Enum
 from typing import Any
@@ -19,7 +20,7 @@ from typing import Any
 import cmaes
 import numpy as np
 
-from harness.assessment.rollout import Game, assess
+from harness.assessment.rollout import Game, assess_batches
 from harness.assessment.seated_arm import SeatedArm
 from harness.assessment.start_trials import start_at
 from harness.errors import StageFailed
@@ -35,7 +36,7 @@ FIRST_EPISODE = 1_000_000
 """Episodes of a search have numbers from here on: their random numbers are those of no assessed game."""
 
 _POPULATION, _ELITE, _KEPT = 20, 4, 0.3
-"""Of the cross-entropy method: points of a generation, those that the next one is fitted to, and the share of the old
+"""Points of a generation; of the cross-entropy method, those that the next one is fitted to, and the share of the old
 distribution that is kept (Rubinstein and Kroese, "The Cross-Entropy Method", 2004, smoothing)."""
 _LEAST_DEVIATION = 0.02
 _FIRST_DEVIATION = 0.3  # of both methods: about that of a uniform distribution
@@ -49,8 +50,9 @@ class Searcher(str, Enum):
     CMA_ES = "cma-es"
 
 
-def points(searcher: Searcher, dimensions: int, *parts: str | int) -> Generator[FloatArray, float, None]:
-    """Points [dimensions] of the unit cube without end; each is sent its loss. `parts` name the random numbers."""
+def generations(searcher: Searcher, dimensions: int, *parts: str | int) -> Generator[FloatArray, Sequence[float], None]:
+    """Generations of points [N, dimensions] of the unit cube, without end; each is sent the losses [N] of its points.
+    `parts` name the random numbers."""
     match searcher:
         case Searcher.RANDOM:
             return _random(dimensions, generator_of(*parts))
@@ -60,24 +62,22 @@ def points(searcher: Searcher, dimensions: int, *parts: str | int) -> Generator[
             return _cma_es(dimensions, *parts)
 
 
-def _random(dimensions: int, generator: np.random.Generator) -> Generator[FloatArray, float, None]:
+def _random(dimensions: int, generator: np.random.Generator) -> Generator[FloatArray, Sequence[float], None]:
     while True:
-        yield generator.random(dimensions)
+        yield generator.random((_POPULATION, dimensions))
 
 
-def _cross_entropy(dimensions: int, generator: np.random.Generator) -> Generator[FloatArray, float, None]:
+def _cross_entropy(dimensions: int, generator: np.random.Generator) -> Generator[FloatArray, Sequence[float], None]:
     mean, deviation = np.full(dimensions, 0.5), np.full(dimensions, _FIRST_DEVIATION)
     while True:
-        played = []
-        for _ in range(_POPULATION):
-            point = np.clip(generator.normal(mean, deviation), 0.0, 1.0)
-            played.append(((yield point), point))
-        elite = np.array([point for _, point in sorted(played, key=lambda each: each[0])[:_ELITE]])
+        points = np.clip(generator.normal(mean, deviation, (_POPULATION, dimensions)), 0.0, 1.0)
+        losses = yield points
+        elite = points[np.argsort(losses, kind="stable")[:_ELITE]]
         mean = _KEPT * mean + (1.0 - _KEPT) * elite.mean(axis=0)
         deviation = np.maximum(_KEPT * deviation + (1.0 - _KEPT) * elite.std(axis=0), _LEAST_DEVIATION)
 
 
-def _cma_es(dimensions: int, *parts: str | int) -> Generator[FloatArray, float, None]:
+def _cma_es(dimensions: int, *parts: str | int) -> Generator[FloatArray, Sequence[float], None]:
     """From the middle of the cube, and after each convergence from a random point."""
     bounds, restart = np.tile([0.0, 1.0], (dimensions, 1)), 0
     mean: FloatArray = np.full(dimensions, 0.5)
@@ -85,11 +85,9 @@ def _cma_es(dimensions: int, *parts: str | int) -> Generator[FloatArray, float, 
         seed = seed_of(*parts, restart) % 2**31
         optimiser = cmaes.CMA(mean=mean, sigma=_FIRST_DEVIATION, bounds=bounds, seed=seed)
         while not optimiser.should_stop():
-            played = []
-            for _ in range(optimiser.population_size):
-                point = optimiser.ask()
-                played.append((point, (yield point)))
-            optimiser.tell(played)
+            points = [optimiser.ask() for _ in range(optimiser.population_size)]
+            losses = yield np.array(points)
+            optimiser.tell(list(zip(points, losses, strict=True)))
         restart += 1
         mean = generator_of(*parts, "restart", restart).random(dimensions)
 
@@ -102,20 +100,33 @@ def falsify(arm: SeatedArm, searcher: Searcher, *, games: int, repeat: int) -> I
     players = len(arm.drivers)
     by_sumo = any(each is not None and not each.takes_over for each in arm.drivers[1:])
     dimensions = 2 * players + (len(RANGES) if by_sumo else 0)
-    search = points(searcher, dimensions, arm.seed, "falsification", searcher.value, repeat)
-    point = next(search)
+    episodes = range(FIRST_EPISODE + repeat * games, FIRST_EPISODE + (repeat + 1) * games)
+    point_of = dict[int, FloatArray]()
+    losses = list[float]()  # of the games of this generation that were played
 
-    def start_from(drawn: InitialState) -> InitialState:
+    def batches() -> Iterator[range]:
+        search = generations(searcher, dimensions, arm.seed, "falsification", searcher.value, repeat)
+        points, first = next(search), 0
+        while first < games:
+            batch = episodes[first : first + len(points)]
+            point_of.update(zip(batch, points, strict=False))  # the last generation may be longer
+            yield batch
+            first += len(batch)
+            if first < games:
+                points = search.send(losses.copy())
+                losses.clear()
+
+    def start_from(episode: int, drawn: InitialState) -> InitialState:
+        point = point_of[episode]
         shares = point[: 2 * players].reshape(2, players).T
         start = start_at(arm.scene, drawn, *starts_in(arm.scene.places, shares))
         return replace(start, ordinary_driver=ordinary_driver_at(point[2 * players :])) if by_sumo else start
 
-    first = FIRST_EPISODE + repeat * games
-    for game in assess(arm, range(first, first + games), start_from=start_from):
+    for game in assess_batches(arm, batches(), start_from=start_from):
         if game.played["error"]:
             raise StageFailed(f"{arm.name}, game {game.played['episode']}: {game.played['error']}")
+        losses.append(loss_of(game.record))
         yield game
-        point = search.send(loss_of(game.record))
 
 
 def loss_of(record: Mapping[str, Any]) -> float:

@@ -67,7 +67,7 @@ class Game:
 def assess(
     arm: SeatedArm,
     episodes: Iterable[int],
-    start_from: Callable[[InitialState], InitialState] = lambda drawn: drawn,
+    start_from: Callable[[int, InitialState], InitialState] = lambda episode, drawn: drawn,
 ) -> Generator[Game, None, None]:
     """Play episodes, given by their numbers, one after the other: `assess_batches` with batches of one."""
     return assess_batches(arm, ([episode] for episode in episodes), start_from=start_from)
@@ -78,7 +78,7 @@ def assess_batches(
     batches: Iterable[Sequence[int]],
     on_start: Callable[[int], None] = lambda episode: None,
     abandoned: Mapping[int, str] = MappingProxyType({}),
-    start_from: Callable[[InitialState], InitialState] = lambda drawn: drawn,
+    start_from: Callable[[int, InitialState], InitialState] = lambda episode, drawn: drawn,
 ) -> Generator[Game, None, None]:
     """Play batches of episodes, in their order. A game that can't be played, or that has impossible numbers, is a
     record with outcome `error`.
@@ -87,7 +87,7 @@ def assess_batches(
     of SUMO and their drivers can. If anything goes wrong among them, each is played again alone.
 
     `on_start` gets each episode number before that game is played. Episodes in `abandoned` are not played; their record
-    has the reason as its error. `start_from` may change the start that is drawn for a game.
+    has the reason as its error. `start_from` may change the start that is drawn for an episode.
     Raises SimulationError if SUMO can't load the scene, MemoryError, and OSError if the disk takes no more.
     """
     with _Rollout(arm, on_start, start_from) as rollout:
@@ -107,7 +107,7 @@ class _Rollout:
         self,
         arm: SeatedArm,
         on_start: Callable[[int], None],
-        start_from: Callable[[InitialState], InitialState],
+        start_from: Callable[[int, InitialState], InitialState],
     ) -> None:
         self._arm, self._on_start, self._start_from = arm, on_start, start_from
         factors, shares = [factors_of(each) for each in arm.drivers], [shares_of(each) for each in arm.drivers]
@@ -179,7 +179,7 @@ class _Rollout:
     def _start(self, episode: int) -> InitialState:
         present = [float(each) for each in self._arm.present_in(episode)]
         parts = parts_of(self._arm.seed, episode)
-        return self._start_from(draw_initial_state(replace(self._starts, present_share=present), *parts))
+        return self._start_from(episode, draw_initial_state(replace(self._starts, present_share=present), *parts))
 
     def _weather(self, start: InitialState) -> dict[str, float]:
         """What the scene varies of it, in one game."""

@@ -56,7 +56,7 @@ class StartTrials:
     def __exit__(self, *error: object) -> None:
         self._games.close()
 
-    def _start(self, drawn: InitialState) -> InitialState:
+    def _start(self, episode: int, drawn: InitialState) -> InitialState:
         start = drawn
         if self._next is not None:
             position_m, speed_mps = np.split(self._next, 2)

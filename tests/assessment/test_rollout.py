@@ -28,13 +28,11 @@ from harness.evaluation.tables import table_of
 from harness.evaluation.trace_file import SCHEMA
 from harness.game.arrays import FloatArray, IntArray
 from harness.road.scene.open_scene import OpenScene, open_scene
-from tests.support.policies import some_policy
 from tests.support.repository import REPOSITORY
-from tests.support.rollouts import Steady, arm, play, records, trace
+from tests.support.rollouts import RANDOM, Steady, arm, play, records, trace
 from tests.support.tiny import TEXTING
 
 FOGGY = REPOSITORY / "tests" / "data" / "perception" / "foggy.toml"
-RANDOM = LearnedDriver(some_policy(), sampled=True)
 MEASURED = [name for name, column in TABLES["episodes"].items() if column.dtype == NUMBER]
 POSE = ["x_m", "y_m", "heading_rad", "speed_mps"]
 

@@ -13,10 +13,15 @@ from harness.assessment.seated_arm import SeatedArm
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.mixture import Mixture, mixture_of
+from harness.drivers.policy_file import LearnedDriver
 from harness.drivers.protocol import Driver
 from harness.game.arrays import FloatArray, IntArray
 from harness.road.scene.open_scene import OpenScene
+from tests.support.policies import some_policy
 from tests.support.tiny import CAREFUL, SPEEDY
+
+RANDOM = LearnedDriver(some_policy(), sampled=True)
+"""A policy with random parameters."""
 
 
 class Steady:
