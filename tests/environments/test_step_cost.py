@@ -166,8 +166,13 @@ def test_reset__without_background_traffic_players_stay_in_sumo(scenes: dict[str
 def test_step__releases_the_memory_that_it_takes(scenes: dict[str, OpenScene]) -> None:
     with counting(scenes["empty"], FEW) as counted:
         counted.steps(1500)  # until caches are filled: of the first 500 steps they keep 700 blocks
-        gc.collect()
-        before = sys.getallocatedblocks()
-        counted.steps(500)
-        gc.collect()
-        assert sys.getallocatedblocks() - before < 350  # 50 to 200 vary from run to run; one per step would be 500
+
+        def kept() -> int:
+            gc.collect()
+            before = sys.getallocatedblocks()
+            counted.steps(500)
+            gc.collect()
+            return sys.getallocatedblocks() - before
+
+        # 50 to 200 vary from run to run, rarely more; one per step would be 500 each time
+        assert min(kept() for _ in range(3)) < 350
