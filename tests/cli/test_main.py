@@ -18,6 +18,7 @@ import pytest
 import typer
 from junitparser import JUnitXml
 
+from harness.campaign.plan.persona_remarks import persona_remarks
 from harness.campaign.plan.plan import plan
 from harness.campaign.preflight import open_campaign
 from harness.campaign.storage.run_folder import RunFolder
@@ -110,10 +111,11 @@ def test_check__lists_the_stages_and_writes_nothing(tmp_path: Path, run_command:
     assert result.code == 0
     opened = open_campaign(campaign)
     stages = plan(opened.document, [persona.name for persona in opened.personas], opened.tunable)
-    lines = [f"{campaign} is in order.", messages.work(opened, stages), *messages.stage_lines(stages)]
+    warnings = persona_remarks(opened.personas, opened.scene.world, opened.document.training.discount)
+    lines = [f"{campaign} is in order.", *warnings, messages.work(opened, stages), *messages.stage_lines(stages)]
     lines.append("Holm's correction over 2 tests about this trained pair: RQ1 speedy, RQ2 speedy (training seed 1)")
     assert result.out.splitlines() == lines
-    assert lines[1] == "3 trainings of up to 2,048 steps, 6 arms of 4 episodes:"
+    assert lines[len(warnings) + 1] == "3 trainings of up to 2,048 steps, 6 arms of 4 episodes:"
     assert "  assess naive_vs_speedy-seed1  after naive-seed1, speedy-seed1" in lines
     assert list(tmp_path.iterdir()) == [campaign]
 

@@ -9,25 +9,26 @@ from math import inf
 import numpy as np
 
 from harness.config.persona import Parametrised, Persona
-from harness.game.junctions import Control
 from harness.game.roles import NON_EGO
 from harness.game.world import World
+
+_AT_STANDSTILL = {"speed_over_limit": -1.0, "speed_mps": 0.0}  # quantities of fuzzy terms
 
 
 def persona_remarks(personas: Sequence[Persona], world: World, discount: float) -> list[str]:
     """A sentence for each payoff of a non-ego that does not suit the scene. `discount` is gamma of the training."""
-    routes, lines = world.road.routes, world.right_of_way.stop_lines
+    routes = world.road.routes
     rows = zip(routes.first_row[NON_EGO:], routes.last_row[NON_EGO:], strict=True)
     a_lane_ends = any(np.isfinite(routes.lane_end_m[first:last]).any() for first, last in rows)
-    has_signals = bool((lines.control[lines.player >= NON_EGO] == Control.SIGNAL).any())
     remarks = []
     for persona in personas:
         found = [] if a_lane_ends else [*_of_lanes(persona)]
         waiting, crash = waiting_cost(persona, world, discount), crash_cost(persona)
-        if has_signals and waiting > crash:
+        if waiting > crash:
             found.append(
-                f"a crash costs {crash:g}, and a long wait at a red light {waiting:.3g} (discounted by {discount:g} a "
-                "step): the person may prefer the crash. Raise collision and rail, or lower time_pressure"
+                f"a crash costs {crash:g}, and standing for long behind somebody {waiting:.3g} (discounted by "
+                f"{discount:g} a step): the person may prefer the crash. Raise collision and rail, or lower "
+                "time_pressure"
             )
         remarks += [f"warning: {persona.name}: {each}" for each in found]
     return remarks
@@ -43,10 +44,15 @@ def ego_persona_remarks(persona: Persona) -> list[str]:
 
 
 def waiting_cost(persona: Persona, world: World, discount: float) -> float:
-    """What the player pays for standing until the time limit, discounted to the first second: the sum of a geometric
-    series."""
-    human = persona.human
+    """What the player pays for standing until the time limit where it could drive, discounted to the first second: the
+    sum of a geometric series."""
+    human, operational = persona.human, persona.operational
     per_second = human.weight * sum(_weight(human.terms.get(name, 0.0)) for name in ("time_pressure", "waiting"))
+    per_second += operational.weight * _weight(operational.terms.get("speed_under_limit", 0.0))
+    for term in human.fuzzy:
+        if term.quantity in _AT_STANDSTILL:
+            value = float(term.function(np.array([_AT_STANDSTILL[term.quantity]]))[0])
+            per_second -= human.weight * term.weight * value
     counted = world.steps if discount == 1.0 else (1.0 - discount**world.steps) / (1.0 - discount)
     return per_second * world.step_s * counted
 

@@ -22,15 +22,16 @@ def test_waiting_cost__is_the_discounted_sum_over_the_steps() -> None:
     )  # 0.8 per second: the hurry of `speedy`
     assert waiting_cost(shipped("speedy"), world, 0.99) == pytest.approx(by_hand)
     assert waiting_cost(shipped("speedy"), world, 1.0) == pytest.approx(0.8 * world.time_limit_s)
+    # time_pressure 0.5 and speed_under_limit 1 a second; nothing for speeding
+    assert waiting_cost(shipped("impatient"), world, 1.0) == pytest.approx(1.5 * world.time_limit_s)
     assert crash_cost(shipped("speedy")) == 5.0
 
 
 @pytest.mark.parametrize(
     ("scene", "persona", "remark"),
     [
-        ("red_light", "speedy", "warning: speedy: a crash costs 5, and a long wait at a red light 7.9"),
-        ("red_light", "red_light_runner", None),
-        ("merge", "speedy", None),  # no traffic light
+        ("merge", "speedy", "warning: speedy: a crash costs 5, and standing for long behind somebody 7.86"),
+        ("merge", "texting", None),
         (
             "left_across",
             "late_merger",
