@@ -24,23 +24,25 @@ def assessment_table() -> str:
     """In Markdown, for some scenes: the games per second of two learned drivers, without and with a shield around the
     ego, and of a learned ego among SUMO's drivers, with traces and without metrics. The best of several turns counts.
     """
-    lines = ["| scene | against | alone | side by side | ratio |", "| --- | --- | ---: | ---: | ---: |"]
+    lines = ["| scene | a learned person | the same, the ego with a shield | SUMO |", "| --- | ---: | ---: | ---: |"]
     for name in _SCENES:
         scene = open_scene(REPOSITORY / "networks" / name)
         people = len(scene.world.roles) - 1
         learned = LearnedDriver(coasting_policy(), sampled=False)
-        pairings: list[tuple[str, Driver, Driver]] = [
-            ("a learned person", learned, learned),
-            ("a learned person, with a shield", ShieldedDriver(learned, scene.world), learned),
-            ("SUMO", learned, SumoDriver()),
+        pairings: list[tuple[Driver, Driver]] = [
+            (learned, learned),
+            (ShieldedDriver(learned, scene.world), learned),
+            (learned, SumoDriver()),
         ]
-        for against, ego, driver in pairings:
+        cells = []
+        for ego, driver in pairings:
             players = (mixture_of(ego, persona("careful")), *[mixture_of(driver, persona("speedy"))] * people)
             arm = SeatedArm(name="benchmark", scene=scene, drivers=players, seed=1)
             alone, together = [[episode] for episode in range(_GAMES)], [range(_GAMES)]
             turns = [(_games_per_s(arm, alone), _games_per_s(arm, together)) for _ in range(_TURNS)]
             slow, fast = map(max, zip(*turns, strict=True))
-            lines.append(f"| `{name}` | {against} | {slow:.0f} | {fast:.0f} | {fast / slow:.1f}× |")
+            cells.append(f"{slow:.0f} → {fast:.0f} ({fast / slow:.1f}×)")
+        lines.append(f"| `{name}` | {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
