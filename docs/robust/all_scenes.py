@@ -25,7 +25,7 @@ from harness.evaluation.tables import read_csv
 CAMPAIGN = read_document(Path(__file__).parents[2] / "campaigns" / "all-scenes.toml", Campaign)
 SCENES, SEEDS = [CAMPAIGN.scene, *CAMPAIGN.roads], CAMPAIGN.seeds
 LATER = ("cut_out",)
-"""Scenes whose people were shipped after these egos had learned: the robust egos met SUMO's driver there."""
+"""Scenes with people that were shipped after these egos had learned: there the robust egos met SUMO's driver alone."""
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, help=__doc__)
 Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="The folder of the leagues.")]
 
@@ -77,9 +77,7 @@ def seeds(folder: Folder) -> None:
         with_people = [each for each in SCENES if each not in LATER]
         both = both[both["scene_naive"].isin(with_people) & ~both["person_naive"].isin(UNTRAINED)]
         p_values.append(f"{mcnemar(both['ego_failed_naive'] - both['ego_failed_robust'], 'two-sided'):.2g}")
-    for (part, ego), cells in sorted(
-        rows.items(), key=lambda row: list(dict.fromkeys(rows)).index(row[0]) % len(parts)
-    ):
+    for (part, ego), cells in sorted(rows.items(), key=lambda row: list(parts).index(row[0][0])):
         print(f"| {part} | {ego} | {' | '.join(cells)} |")
     print(f"| the first two kinds of people, both egos | p (McNemar) | {' | '.join(p_values)} |")
 

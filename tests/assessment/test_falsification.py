@@ -50,6 +50,8 @@ def test_generations__of_cma_es_go_on_after_it_has_converged() -> None:
     generation = next(search)
     for _ in range(400):
         generation = search.send([1.0] * len(generation))
+        assert generation.shape[1] == 2
+        assert ((generation >= 0.0) & (generation <= 1.0)).all()
 
 
 def test_loss__is_the_time_to_collision_within_bounds_and_nothing_where_the_ego_fails() -> None:
