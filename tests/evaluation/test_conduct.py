@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from harness.evaluation.columns import TABLES
 from harness.evaluation.measured_game import METRICS_OF_CONDUCT, conduct_of
 from harness.game.arrays import FloatArray
-from harness.road.scene.open_scene import OpenScene
+from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.traces import game, rows
 
 STEPS, STEP_S = 60, 0.1
@@ -59,6 +60,14 @@ def test_lane_change__lasts_from_5_to_95_percent_of_the_way(merge: OpenScene) ->
     y = np.interp(np.arange(STEPS), [10, 40], [ENDING_Y, THROUGH_Y])  # 3.3 % a step: on its way from step 11 to 39
     row = conduct(merge, car("non_ego", y_m=y), player="non_ego")
     assert row["lane_change_s"] == pytest.approx(2.8)
+
+
+def test_lane_change__is_measured_from_the_lanes_and_not_from_the_line_of_the_route(repository: Path) -> None:
+    cut_in = open_scene(repository / "networks/cut_in")
+    lane_y, next_y, taper_x, full_x = 38.25, 34.75, 450.0, 510.0  # the route's line moves into the lane that opens here
+    y = np.interp(np.arange(STEPS), [10.5, 50.5], [lane_y, next_y])
+    row = conduct(cut_in, car("non_ego", x_m=taper_x, y_m=y, speed_mps=(full_x - taper_x) / 3.0), player="non_ego")
+    assert row["lane_change_s"] == pytest.approx(3.7)  # from step 12 to step 49
 
 
 def test_lane_change__that_is_given_up_or_not_completed_is_none(merge: OpenScene) -> None:
