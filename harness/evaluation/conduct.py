@@ -18,7 +18,7 @@ FOLLOWS_S = 3.0
 _FOLLOWS_LEAST_S = 15.0
 """From this time on behind the same vehicle a player follows it: a usual criterion of studies."""
 _MOVING_MPS = 5.0
-_ON_CENTRE = 0.05  # of the way from lane to lane
+_BEGUN, _ENDED = 0.05, 0.95  # of the way from lane to lane
 _KEEPS_LEAST_S = 2.0  # of lane keeping, in all
 _WHEEL_RATIO = 15.0  # of a steering wheel's angle to that of the road wheels
 _REVERSAL_RAD = np.radians(3.0) / _WHEEL_RATIO
@@ -42,11 +42,13 @@ def lane_changes(drive: Drive) -> list[LaneChange]:
     """The changes of lane that a player began and ended while it drove. The first 5 % and the last 5 % of the way are
     those of keeping a lane."""
     found, (centre_m, place_m) = list[LaneChange](), _in_lane(drive)
-    off_centre_m = place_m - centre_m  # of the lane in that step: the route's line, and with it all centres, may move
+    moved_m = np.diff(centre_m, prepend=centre_m[:1])
+    line_m = np.where(np.abs(moved_m) <= LANE_CHANGE_M, -moved_m, 0.0).cumsum()  # where a lane opens, the line moves
+    centre_m, place_m = centre_m + line_m, place_m + line_m
     for step in np.flatnonzero(np.abs(np.diff(centre_m)) > LANE_CHANGE_M).tolist():
-        share = off_centre_m / (centre_m[step + 1] - centre_m[step])
-        before = np.flatnonzero(share[: step + 1] <= _ON_CENTRE)
-        behind = np.flatnonzero(share[step + 1 :] >= -_ON_CENTRE)
+        old_m, new_m = centre_m[step], centre_m[step + 1]
+        share = (place_m - old_m) / (new_m - old_m)
+        before, behind = np.flatnonzero(share[: step + 1] <= _BEGUN), np.flatnonzero(share[step + 1 :] >= _ENDED)
         if len(before) and len(behind):
             found.append(LaneChange(int(before[-1]), step + 1 + int(behind[0])))
     return found

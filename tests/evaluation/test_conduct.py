@@ -71,9 +71,9 @@ def test_lane_change__is_measured_from_the_lanes_and_not_from_the_line_of_the_ro
 
 
 def test_lane_change__that_is_given_up_or_not_completed_is_none(merge: OpenScene) -> None:
-    back = np.interp(np.arange(STEPS), [10, 20, 30], [ENDING_Y, -3.3, ENDING_Y])
+    back, over_the_mark = (np.interp(np.arange(STEPS), [10, 20, 30], [ENDING_Y, y, ENDING_Y]) for y in (-3.3, -3.0))
     late = np.interp(np.arange(STEPS), [40, 70], [ENDING_Y, THROUGH_Y])
-    for y in (back, late):
+    for y in (back, over_the_mark, late):
         assert conduct(merge, car("non_ego", y_m=y), player="non_ego")["lane_change_s"] is None
 
 
