@@ -8,6 +8,8 @@ Each command prints a table in Markdown.
 
 from __future__ import annotations
 
+import json
+import re
 from pathlib import Path
 from typing import Annotated
 
@@ -15,6 +17,7 @@ import pandas as pd
 import typer
 
 from harness.campaign.results.league_games import LEAGUE_GAMES, games_in
+from harness.campaign.storage.run_folder import MANIFEST
 from harness.config.campaign import Campaign
 from harness.config.toml_reading import read_document
 from harness.evaluation.comparisons.comparison import mcnemar
@@ -22,10 +25,17 @@ from harness.evaluation.comparisons.tied_ranks import GAME
 from harness.evaluation.league_columns import NOBODY, SUMO_DRIVER, UNTRAINED
 from harness.evaluation.tables import read_csv
 
-CAMPAIGN = read_document(Path(__file__).parents[2] / "campaigns" / "all-scenes.toml", Campaign)
+ROOT = Path(__file__).parents[2]
+CAMPAIGN = read_document(ROOT / "campaigns" / "all-scenes.toml", Campaign)
 SCENES, SEEDS = [CAMPAIGN.scene, *CAMPAIGN.roads], CAMPAIGN.seeds
-LATER = ("cut_out",)
-"""Scenes with people that were shipped after these egos had learned: there the robust egos met SUMO's driver alone."""
+SHIPPED = {
+    (found[1], int(found[2]))
+    for name in json.loads((ROOT / "reports" / "all-scenes" / MANIFEST).read_bytes())["hashes"]
+    if (found := re.search(r"policies/(\w+)/\w+-seed(\d+)/", name))
+}
+"""Scenes and training seeds of the people that were shipped when these egos learned. In the scenes of theirs that have
+none, the robust egos met SUMO's driver alone."""
+LATER = [each for each in SCENES if each not in dict(SHIPPED)]
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, help=__doc__)
 Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="The folder of the leagues.")]
 
@@ -38,11 +48,12 @@ def games_of(folder: Path, ego: str) -> pd.DataFrame:
 
 
 def met(games: pd.DataFrame, number: int) -> pd.Series:
-    """Whether the person is one that the robust ego of a training, counted from 0, has met: of each person one training
-    is left out, unless there is one alone."""
+    """Whether the person is one that the robust ego of a training, counted from 0, has met: of each person that was
+    shipped then, one training is left out, unless there is one alone."""
+    shipped = pd.MultiIndex.from_frame(games[["scene", "seed"]]).isin(SHIPPED)
     trainings = games.groupby(["scene", "person"])["seed"].transform(lambda own: len(set(own)))
     place = games.groupby(["scene", "person"])["seed"].rank(method="dense") - 1
-    return (trainings == 1) | (place != number % trainings)
+    return shipped & ((trainings == 1) | (place != number % trainings))
 
 
 def fails(games: pd.DataFrame) -> str:

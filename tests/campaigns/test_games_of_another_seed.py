@@ -17,7 +17,7 @@ from harness.evaluation.trace_file import read_traces
 from tests.support.plans import campaign_of
 from tests.support.tiny import REPOSITORY, UNTRAINED, finished
 
-FIRST, SECOND = 21, 22
+FIRST, SECOND = 71, 72
 ARM = "naive_vs_sumo"
 
 
