@@ -24,6 +24,7 @@ from harness.game.arrays import FloatArray
 from harness.replay.vehicles import PLAYER_COLOURS, shown_name
 
 _CAPTION_PX, _LABEL_PX = 16, 14
+_CORNER_PX = (12, 10)
 _AWAY_M = 3.5  # of the middle of a label from the middle of its vehicle
 _LEAST_AWAY_PX = 34.0
 _INK, _PAPER, _MARGIN_PX = (20, 20, 20), (255, 255, 255), 3
@@ -76,9 +77,12 @@ def box_px(label: Label) -> Box:
 
 
 def captioned(picture: Image.Image, caption: str, labels: Sequence[Label]) -> Image.Image:
-    """The picture with a caption in its corner, and labels on lines that lead to what they name."""
+    """The picture with a caption in its corner, and labels on lines that lead to what they name. Each is on paper, so
+    that it can be read before a road, too."""
     draw = ImageDraw.Draw(picture)
-    draw.text((12, 10), caption, fill=_INK, font=_font(_CAPTION_PX))
+    left, top, right, bottom = draw.textbbox(_CORNER_PX, caption, font=_font(_CAPTION_PX))
+    draw.rectangle([left - _MARGIN_PX, top - _MARGIN_PX, right + _MARGIN_PX, bottom + _MARGIN_PX], fill=_PAPER)
+    draw.text(_CORNER_PX, caption, fill=_INK, font=_font(_CAPTION_PX))
     middle = 0.5 * picture.width, 0.5 * picture.height
     for label in labels:
         x, y = middle[0] + label.at_px[0], middle[1] - label.at_px[1]

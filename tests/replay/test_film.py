@@ -13,7 +13,7 @@ from PIL import Image
 from harness.errors import HarnessError
 from harness.replay import write_film
 from harness.replay.film import SIZE_PX, WIDTH_M, film_problems, shown_steps
-from harness.replay.pictures import Label, box_px, encode, kept_apart, labels_at
+from harness.replay.pictures import Label, box_px, captioned, encode, kept_apart, labels_at
 from harness.replay.scenery import labels_of_contacts
 from harness.road.xml.xml_file import parse_xml
 from tests.support.pictures import blue, orange, require_gui
@@ -37,6 +37,16 @@ def place_m(mask: np.ndarray) -> np.ndarray:
     rows, columns = np.nonzero(mask)
     x, y = 0.5 * (columns.min() + columns.max()), 0.5 * (rows.min() + rows.max())
     return np.array([x - 0.5 * SIZE_PX[0], 0.5 * SIZE_PX[1] - y]) / PX_PER_M
+
+
+def test_captioned__can_be_read_before_a_dark_road() -> None:
+    asphalt = (70, 70, 90)  # no mixture of ink and paper
+    for caption in ("a game  7.5 s", "a game  7.5 s\nblue: ego, orange: speedy"):
+        picture = np.asarray(captioned(Image.new("RGB", (400, 200), asphalt), caption, []))
+        ink = np.argwhere((picture < 60).all(axis=-1))
+        (top, left), (bottom, right) = ink.min(axis=0), ink.max(axis=0)
+        around = picture[top - 2 : bottom + 3, left - 2 : right + 3]
+        assert not (around == asphalt).all(axis=-1).any()  # nothing but ink and paper
 
 
 def test_film__shows_the_players_where_the_trace_has_them(merge_net: Path, tmp_path: Path) -> None:
