@@ -33,9 +33,9 @@ SHIPPED = {
     for name in json.loads((ROOT / "reports" / "all-scenes" / MANIFEST).read_bytes())["hashes"]
     if (found := re.search(r"policies/(\w+)/\w+-seed(\d+)/", name))
 }
-"""Scenes and training seeds of the people that were shipped when these egos learned. In the scenes of theirs that have
-none, the robust egos met SUMO's driver alone."""
-LATER = [each for each in SCENES if each not in dict(SHIPPED)]
+"""Scenes and training seeds of the people that were shipped when these egos learned."""
+LATER = set(SCENES) - {scene for scene, _ in SHIPPED}
+"""Scenes for which no people were shipped then: the robust egos met SUMO's driver alone there."""
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, help=__doc__)
 Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="The folder of the leagues.")]
 

@@ -77,8 +77,8 @@ def box_px(label: Label) -> Box:
 
 
 def captioned(picture: Image.Image, caption: str, labels: Sequence[Label]) -> Image.Image:
-    """The picture with a caption in its corner, and labels on lines that lead to what they name. Each is on paper, so
-    that it can be read before a road, too."""
+    """The picture with a caption in its corner, and labels on lines that lead to what they name. Each has
+    a white background: it can be read on a dark road, too."""
     draw = ImageDraw.Draw(picture)
     left, top, right, bottom = draw.textbbox(_CORNER_PX, caption, font=_font(_CAPTION_PX))
     draw.rectangle([left - _MARGIN_PX, top - _MARGIN_PX, right + _MARGIN_PX, bottom + _MARGIN_PX], fill=_PAPER)

@@ -17,7 +17,8 @@ from harness.evaluation.trace_file import read_traces
 from tests.support.plans import campaign_of
 from tests.support.tiny import REPOSITORY, UNTRAINED, finished
 
-FIRST, SECOND = 71, 72
+PEOPLE = REPOSITORY / "policies" / "stop_sign"
+FIRST, SECOND = sorted(int(each.name.rpartition("seed")[2]) for each in PEOPLE.iterdir())[:2]
 ARM = "naive_vs_sumo"
 
 
@@ -31,7 +32,7 @@ def run() -> Path:
             "scene": str(REPOSITORY / "networks" / "stop_sign"),
             "personas": [str(REPOSITORY / "personas" / "rolling_stop.toml")],
             "seeds": [FIRST, SECOND],
-            "policies": str(REPOSITORY / "policies" / "stop_sign"),
+            "policies": str(PEOPLE),
         }
     )
 

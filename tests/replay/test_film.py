@@ -39,7 +39,7 @@ def place_m(mask: np.ndarray) -> np.ndarray:
     return np.array([x - 0.5 * SIZE_PX[0], 0.5 * SIZE_PX[1] - y]) / PX_PER_M
 
 
-def test_captioned__can_be_read_before_a_dark_road() -> None:
+def test_captioned__can_be_read_on_a_dark_road() -> None:
     asphalt = (70, 70, 90)  # no mixture of ink and paper
     for caption in ("a game  7.5 s", "a game  7.5 s\nblue: ego, orange: speedy"):
         picture = np.asarray(captioned(Image.new("RGB", (400, 200), asphalt), caption, []))
