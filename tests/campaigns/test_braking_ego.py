@@ -18,8 +18,10 @@ from harness.cli.app import app
 from harness.errors import UsageError
 from harness.evaluation.tables import read_csv, write_csv
 from harness.game.observation_layout import SIZE
+from tests.support.shipped import SEED, people_seeds
 
 EPISODES = 3
+SEEDS = people_seeds("red_light")
 ALL_OF_THREE = 0.025 ** (1 / 3)
 """The low end of the Clopper-Pearson interval of 3 of 3."""
 
@@ -58,9 +60,9 @@ def rows(league: Path) -> pd.DataFrame:
 
 def test_rows__every_shipped_person_and_ordinary_traffic_in_every_scene(league: Path) -> None:
     """A person has a row for each of its trainings."""
-    merge = [("paper_merge", person, 11) for person in ("nobody", "sumo", "paper_distracted", "paper_speedy")]
-    light = [("red_light", "nobody", 21), ("red_light", "sumo", 21)]
-    light += [("red_light", "red_light_runner", seed) for seed in (21, 22, 23)]
+    merge = [("paper_merge", person, SEED) for person in ("nobody", "sumo", "paper_distracted", "paper_speedy")]
+    light = [("red_light", "nobody", SEEDS[0]), ("red_light", "sumo", SEEDS[0])]
+    light += [("red_light", "red_light_runner", seed) for seed in SEEDS]
     assert sorted(rows(league).index) == sorted(merge + light)
     assert set(rows(league)["ego"]) == {"brake"}
     assert set(rows(league)["episodes"]) == {EPISODES}
@@ -68,7 +70,7 @@ def test_rows__every_shipped_person_and_ordinary_traffic_in_every_scene(league: 
 
 def test_rows__an_ego_that_stands_runs_out_of_time(league: Path) -> None:
     """Alone it brakes to a stand in every game, which hurts nobody, and has no person to prevent anything against."""
-    row = rows(league).loc["paper_merge", "nobody", 11]
+    row = rows(league).loc["paper_merge", "nobody", SEED]
     assert row[["failure_rate", "failure_rate_high", "hard_brake_rate"]].tolist() == [1.0, 1.0, 1.0]
     assert row["failure_rate_low"] == pytest.approx(ALL_OF_THREE)
     assert row[["collisions", "rails", "timeouts", "errors"]].tolist() == [0, 0, EPISODES, 0]
@@ -78,7 +80,7 @@ def test_rows__an_ego_that_stands_runs_out_of_time(league: Path) -> None:
 
 def test_rows__an_ego_that_brakes_for_nothing_is_hit_from_behind(league: Path) -> None:
     """On the red light's road a car follows it in most games."""
-    row = rows(league).loc["red_light", "nobody", 21]
+    row = rows(league).loc["red_light", "nobody", SEEDS[0]]
     assert row["collisions"] + row["timeouts"] == EPISODES
     assert row["collisions"] > 0
     assert row["serious_injuries"] > 0.0
@@ -88,7 +90,8 @@ def test_rows__of_people_say_nothing_where_the_ego_cannot_drive_the_scene_alone(
     """They are the last, and the page says why."""
     reason = "the ego brake can't drive this scene: alone it reaches its goal in 0 of 3 games (0 %), below 97 %"
     reasons = rows(league)["reason"]
-    assert sorted(reasons[reasons == ""].index) == [("paper_merge", "nobody", 11), ("red_light", "nobody", 21)]
+    alone = [("paper_merge", "nobody", SEED), ("red_light", "nobody", SEEDS[0])]
+    assert sorted(reasons[reasons == ""].index) == alone
     assert all(each.startswith(reason) for each in reasons.drop("nobody", level="person"))
     assert reasons.index[:2].get_level_values("person").tolist() == ["nobody", "nobody"]
     page = html.unescape((league / "league.html").read_text(encoding="utf-8"))
@@ -102,7 +105,7 @@ def test_rows__are_those_of_the_run_folders(league: Path) -> None:
     regulation = judged[judged["driver"] == "careful_and_competent"]
     summary = read_csv(league / "paper_merge" / "summary.csv").set_index("arm")
     for person in ("paper_speedy", "paper_distracted"):
-        row, arm = rows(league).loc["paper_merge", person, 11], f"naive_vs_{person}"
+        row, arm = rows(league).loc["paper_merge", person, SEED], f"naive_vs_{person}"
         prevented = regulation[regulation["arm"] == arm]["prevented_from_start"].sum()
         assert row["preventable_rate"] == pytest.approx(prevented / EPISODES)
         assert row["mean_speed_mps"] == summary.loc[arm, "mean_speed_mps"]
@@ -110,7 +113,7 @@ def test_rows__are_those_of_the_run_folders(league: Path) -> None:
 
 def test_page__cells_open_games_of_the_reports(league: Path) -> None:
     page = (league / "league.html").read_text(encoding="utf-8")
-    assert page.count('href="red_light/report.html#game=naive_alone,21,') == 2  # in the matrix and in the list
+    assert page.count(f'href="red_light/report.html#game=naive_alone,{SEEDS[0]},') == 2  # in the matrix and in the list
     assert "3 of 3" in page
 
 

@@ -15,10 +15,10 @@ from harness.campaign.storage.run_folder import RunFolder
 from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import read_traces
 from tests.support.plans import campaign_of
+from tests.support.shipped import people_seeds
 from tests.support.tiny import REPOSITORY, UNTRAINED, finished
 
-PEOPLE = REPOSITORY / "policies" / "stop_sign"
-FIRST, SECOND = sorted(int(each.name.rpartition("seed")[2]) for each in PEOPLE.iterdir())[:2]
+FIRST, SECOND = people_seeds("stop_sign")[:2]
 ARM = "naive_vs_sumo"
 
 
@@ -32,7 +32,7 @@ def run() -> Path:
             "scene": str(REPOSITORY / "networks" / "stop_sign"),
             "personas": [str(REPOSITORY / "personas" / "rolling_stop.toml")],
             "seeds": [FIRST, SECOND],
-            "policies": str(PEOPLE),
+            "policies": str(REPOSITORY / "policies" / "stop_sign"),
         }
     )
 

@@ -91,7 +91,7 @@ def test_ten_seeds__are_the_papers_campaign_ten_times(repository: Path) -> None:
 def test_merge_seeds__are_the_merge_ten_times() -> None:
     ten, one = (open_campaign(CAMPAIGNS / f"{name}.toml").document for name in ("merge-seeds", "merge"))
     assert ten.model_copy(update={"name": one.name, "seeds": one.seeds, "best_response": None}) == one
-    assert ten.seeds == list(range(21, 31))
+    assert len(set(ten.seeds)) == 10
 
 
 def test_shipped_policies__each_has_its_model_card_and_was_trained_on_the_scene() -> None:

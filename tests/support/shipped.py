@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from harness.campaign.shipped_people import people_of
 from tests.support.repository import REPOSITORY
 
 FOLDER = "paper_merge"  # of the shipped policies; their scene and their campaign have the same name
@@ -16,6 +17,11 @@ CAMPAIGN, DEMO = CAMPAIGNS / f"{FOLDER}.toml", CAMPAIGNS / "demo.toml"
 def stage(name: str) -> str:
     """A stage of the shipped policies' training seed."""
     return f"{name}-seed{SEED}"
+
+
+def people_seeds(scene: str) -> list[int]:
+    """The training seeds of the shipped people of a scene."""
+    return sorted({seed for people in people_of(REPOSITORY / "networks" / scene) for seed in people.seeds})
 
 
 NAIVE, PERSON, RETRAINED = stage("naive"), stage(SPEEDY), stage(f"retrained_{SPEEDY}")
