@@ -65,7 +65,6 @@ SECTIONS = {
     ),
     "Results": (
         "results",
-        "personas-on-the-merge",
         "game-on-the-merge",
         "robust",
         "one-ego-for-all-scenes",
