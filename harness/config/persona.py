@@ -30,7 +30,7 @@ class Source(Document):
 COMPARED_WITH_PEOPLE = (
     *("lane_change_s", "free_over_limit_mps", "following_gap_s", "accepted_gap_s", "max_deceleration_mps2"),
     *("max_lateral_acceleration_mps2", "max_jerk_mps3", "lateral_wander_m", "latest_red_s_at_most_2"),
-    *("crashes_per_million_km", "crash_odds_ratio"),
+    *("moving_speed_mps", "crashes_per_million_km", "crash_odds_ratio"),
 )
 """The figures of `realism.csv` that have a published range."""
 

@@ -12,6 +12,7 @@ from harness.evaluation.metrics import Drive, finite, metric
 from harness.evaluation.rule_book.course import nearest_lane_m, runs
 from harness.evaluation.rule_book.thresholds import LANE_CHANGE_M
 from harness.game.arrays import BoolArray, FloatArray
+from harness.game.meetings import STANDING_MPS
 
 FOLLOWS_S = 3.0
 """Largest gap over own speed at which a player follows its leader."""
@@ -57,6 +58,12 @@ def lane_changes(drive: Drive) -> list[LaneChange]:
 @metric("conduct", meaning="Distance along the route.")
 def distance_m(drive: Drive) -> float:
     return float(drive.of("advanced_m").sum())
+
+
+@metric("conduct", meaning="Mean speed while it moves.")
+def moving_speed_mps(drive: Drive) -> float | None:
+    speed_mps = drive.of("speed_mps")
+    return finite(speed_mps[speed_mps > STANDING_MPS], np.mean)
 
 
 @metric(

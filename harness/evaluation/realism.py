@@ -119,7 +119,16 @@ OF_DRIVERS = (
 )
 _ROUNDING = 1e-6  # of a figure that a limit of the body holds exactly
 OF_RIDERS = (HumanFigure(metric="accepted_gap_s", source=""),)
-OF_WALKERS = (HumanFigure(metric="accepted_gap_s", low=3.0, source="3 s at least (DiPietro and King 1970)"),)
+OF_WALKERS = (
+    HumanFigure(metric="accepted_gap_s", low=3.0, source="3 s at least (DiPietro and King 1970)"),
+    HumanFigure(
+        metric="moving_speed_mps",
+        low=0.92,
+        high=1.60,
+        games=Games.ALONE,
+        source="15th percentile of older people 0.92 m/s (TCRP Report 112); 1.36 m/s, SD 0.24 (Randles et al. 2010)",
+    ),
+)
 CRASHES = "crashes_per_million_km"
 CRASH_SOURCE = "2.91 crashed vehicles per million km (arXiv 2312.12675v3)"
 CRASH_ODDS = "crash_odds_ratio"

@@ -10,6 +10,10 @@ from harness.evaluation.strategies import NaiveEgo, NonEgoStrategy, SumoNonEgo, 
 from harness.reports.acceptance_wording import TITLES
 from harness.reports.run_tables import RunTables
 
+COMPETENT_SHARE = 0.03
+"""An ego that fails in no greater share of its games alone, or against an ordinary driver, is competent there: what
+people make it do matters more. Our own: what is left of the default of `[competence] ego_goal_share`."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Focus:
@@ -31,14 +35,18 @@ class Focus:
 
 
 def focus_of(tables: RunTables) -> Focus | None:
-    """The arm of the naive or a last ego alone, or against an ordinary driver, if the ego fails in it; else that of the
-    first broken bound that was measured, of one with failures if there is any; else the one with the most failures
-    among the last egos against their personas; else among the naive ego's. None: no ego fails, and no measured bound is
-    broken."""
-    return next(_candidates(tables), None)
+    """The arm of the naive or a last ego alone, or against an ordinary driver, if the ego fails in more than
+    `COMPETENT_SHARE` of its games; else that of the first broken bound that was measured, of one with failures if there
+    is any; else the one with the most failures among the last egos against their personas; else among the naive ego's;
+    else the first in which the ego fails alone, or against an ordinary driver. None: no ego fails, and no measured
+    bound is broken."""
+    without = list(_without_people(tables))
+    incompetent = [each for each in without if each.failed > COMPETENT_SHARE * tables.counts_of(each.arm)[1]]
+    return next(iter([*incompetent, *_with_people(tables), *without]), None)
 
 
-def _candidates(tables: RunTables) -> Iterator[Focus]:
+def _without_people(tables: RunTables) -> Iterator[Focus]:
+    """The arms in which the naive and the last egos fail most often alone, and against an ordinary driver."""
     changed = f"{tables.change.made} ego"
     for ego, made in ((tables.naive, {NaiveEgo()}), (changed, {tables.last_ego(each) for each in tables.personas})):
         for is_ordinary, where in ((False, "fails alone"), (True, f"fails against an ordinary {tables.person}")):
@@ -47,6 +55,11 @@ def _candidates(tables: RunTables) -> Iterator[Focus]:
             if failed:
                 happens = f"the {ego} {where}"
                 yield Focus(arm=arm, ego=ego, persona="", happens=happens, failed=failed, is_ordinary=is_ordinary)
+
+
+def _with_people(tables: RunTables) -> Iterator[Focus]:
+    """The broken bounds, then the arms in which the last egos, and the naive ego, fail most often against people."""
+    changed = f"{tables.change.made} ego"
     yield from sorted(_broken(tables), key=lambda each: not each.failed)
     last = [(against_persona(tables.last_ego(each), each).name, each) for each in tables.personas]
     naive = [(tables.arms_of("RQ1", each)[1], each) for each in tables.personas]

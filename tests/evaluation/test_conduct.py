@@ -50,10 +50,17 @@ def test_conduct__has_a_row_for_each_player_with_every_metric(merge: OpenScene) 
 def test_steady_driving__by_hand(merge: OpenScene) -> None:
     row = conduct(merge, car("ego"))
     assert row["distance_m"] == pytest.approx(12.0 * 59 * STEP_S, abs=0.5)
+    assert row["moving_speed_mps"] == pytest.approx(12.0)
     assert row["free_over_limit_mps"] == pytest.approx(12.0 - LIMIT_MPS)
     assert (row["max_jerk_mps3"], row["steering_reversals_per_s"], row["looks_away_share"]) == (0.0, 0.0, 0.0)
     assert row["lateral_wander_m"] == pytest.approx(0.0, abs=1e-6)
     assert all(row[name] is None for name in ("lane_change_s", "following_gap_s", "longest_lapse_s", "accepted_gap_s"))
+
+
+def test_moving_speed__is_that_of_the_steps_in_which_it_does_not_stand(merge: OpenScene) -> None:
+    waits = np.where(np.arange(STEPS) < 30, 0.0, 1.2)
+    assert conduct(merge, car("ego", speed_mps=waits))["moving_speed_mps"] == pytest.approx(1.2)
+    assert conduct(merge, car("ego", speed_mps=0.0))["moving_speed_mps"] is None
 
 
 def test_lane_change__lasts_from_5_to_95_percent_of_the_way(merge: OpenScene) -> None:

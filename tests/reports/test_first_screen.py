@@ -155,6 +155,13 @@ def test_focus__is_first_the_ordinary_driver_then_the_broken_bound_then_the_last
     assert focus_of(run_of(failing=LAWFUL | {"naive": 0.0, "retrained": 0.0})) is None
 
 
+def test_focus__is_on_people_where_the_ego_fails_in_at_most_3_percent_without_them():
+    for people, expected in (({}, "retrained_vs_speedy"), ({"naive": 0.0, "retrained": 0.0}, "naive_vs_sumo")):
+        run = run_of(failing=LAWFUL | people)
+        run.summary.loc[run.summary["arm"] == "naive_vs_sumo", ["failure_rate", "collisions"]] = (1 / 60, 1)
+        assert focus_of(replace(run)).arm == expected
+
+
 def test_focus__is_the_last_ego_too_that_fails_alone():
     run = run_of(failing=LAWFUL)
     run.summary.loc[run.summary["arm"] == "retrained_alone_speedy", ["failure_rate", "collisions"]] = (0.1, 6)
