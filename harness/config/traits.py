@@ -32,14 +32,14 @@ TRAITS: Mapping[str, Trait] = {
     "shoulder_glance": Trait(keys=("perception.no_shoulder_glance_share",), words="shoulder glances"),
     "noticing": Trait(
         keys=("perception.looked_but_failed_to_see_share", "perception.noticed_within_m"),
-        words="noticing of other cars",
+        words="noticing of others",
     ),
     "sight": Trait(keys=("perception.range_m", "perception.field_of_view_deg"), words="range and field of view"),
     "estimation": Trait(
         keys=("perception.distance_error", "perception.closing_error_per_s"),
-        words="estimates of distance and closing speed",
+        words="estimates of distance and speed",
     ),
-    "actuators": Trait(keys=("actuators",), words="use of the car"),
+    "actuators": Trait(keys=("actuators",), words="actuators"),
 }
 """By name."""
 

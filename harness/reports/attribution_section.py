@@ -48,13 +48,16 @@ def trait_words(trait: str) -> str:
 
 
 def _lines(persona: str, rows: pd.DataFrame, tables: RunTables, links: GameLinks) -> Iterator[dict[str, str]]:
-    reasons = dict.fromkeys(filter(None, rows["reason"]))
-    yield from ({"text": f"Not answered: {as_sentence(reason)}", "game": ""} for reason in reasons)
-    counts = rows[rows["trait"] != ALL_TRAITS].groupby("trait", sort=False)[list(COUNTS)].sum()
+    answered, several = rows[rows["reason"] == ""], rows["seed"].nunique() > 1
+    for reason, of_reason in rows[rows["reason"] != ""].groupby("reason", sort=False):
+        seeds = ", ".join(map(str, of_reason["seed"].unique()))
+        for_seeds = f" for training seed {seeds}" if several else ""
+        yield {"text": f"Not answered{for_seeds}: {as_sentence(str(reason))}", "game": ""}
+    counts = answered[answered["trait"] != ALL_TRAITS].groupby("trait", sort=False)[list(COUNTS)].sum()
     caused = counts["failures"] - counts["failures_without"]
-    if not reasons and len(caused):
+    if len(caused):
         best = str(caused.idxmax())
-        of_best = rows[rows["trait"] == best]
+        of_best = answered[answered["trait"] == best]
         text = _sentence(persona, best, counts.loc[best].to_dict(), of_best, tables)
         yield {"text": text, "game": _pair_address(of_best, links)}
     if undecided := _undecided(persona, tables):
@@ -124,7 +127,7 @@ def _cells(row: Row) -> dict[str, Any]:
 
 
 def _of(count: Any, games: Any) -> str:
-    return MISSING if pd.isna(count) else f"{count} of {games}"
+    return MISSING if pd.isna(count) else f"{count}{NO_SPACE}of{NO_SPACE}{games}"
 
 
 def _caused(row: Row, name: str) -> str:
@@ -132,5 +135,5 @@ def _caused(row: Row, name: str) -> str:
     value, low, high = (100.0 * row[f"{name}_difference{end}"] for end in ("", "_low", "_high"))
     if not math.isfinite(value):
         return MISSING
-    span = f" ({signed(low, 1)} to {signed(high, 1)})" if math.isfinite(low) else ""
+    span = f" ({signed(low, 1)}{NO_SPACE}to{NO_SPACE}{signed(high, 1)})" if math.isfinite(low) else ""
     return f"{signed(value, 1)}{NO_SPACE}points{span}"

@@ -199,7 +199,7 @@ def _plot(figure: str, rows: pd.DataFrame, place: int) -> Markup:
         axes.set_ylim(len(rows) - 0.5, -0.5)
         axes.set_yticks(range(len(rows)), rows["player"])
         axes.grid(visible=False)
-        axes.set_xlabel(title_of(figure))
+        drawing.supxlabel(title_of(figure), size="medium")  # may be wider than the axes
         axes.xaxis.set_major_formatter(lambda value, _: percent(value) if _is_share(figure) else short(value))
         axes.tick_params(axis="y", color=INK)
         return svg(drawing, f"people{place}", f"{title_of(figure)}. {'; '.join(_spoken(rows))}")

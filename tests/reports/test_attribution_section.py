@@ -68,6 +68,13 @@ def test_sentence__of_players_that_can_not_drive_is_the_reason() -> None:
     ]
 
 
+def test_sentence__is_about_the_trainings_that_are_answered() -> None:
+    reason = "the careful driver can't drive this scene"
+    withheld, answered = texts(trait_row("payoff", 26, 20, reason=reason, seed=3), trait_row("payoff", 26, 3))
+    assert withheld == "Not answered for training seed 3: The careful driver can't drive this scene."
+    assert answered.startswith("With the payoff and policy of careful, speedy makes the naive ego fail in 3 of 100")
+
+
 def test_undecided__is_a_sentence_where_there_are_such_failures() -> None:
     counts = {"failures": 26, "undecided_all_game": 1, "undecided_since_conflict": 12, "undecided_last_second": 9}
     _, found = texts(trait_row("payoff", 26, 3), undecided=[{"arm": OWN, "persona": "speedy", "seed": 1, **counts}])
@@ -90,12 +97,7 @@ def test_game__is_that_with_the_trait_beside_that_without() -> None:
 def test_rows__have_counts_differences_and_p() -> None:
     (cells,) = section(trait_row("attention", 26, 3, without_difference_low=0.1, without_difference_high=0.36))["rows"]
     assert cells["trait"] == "attention"
-    assert cells["cells"] == [
-        *(
-            "26 of 100",
-            "3 of 100",
-            "23\N{NO-BREAK SPACE}points (10 to 36)",
-            "< 0.0001".replace(" ", "\N{NO-BREAK SPACE}"),
-        ),
-        *("2 of 100", "9 of 100", f"7{NO_SPACE}points", "–"),
+    assert [each.replace(NO_SPACE, " ") for each in cells["cells"]] == [
+        *("26 of 100", "3 of 100", "23 points (10 to 36)", "< 0.0001"),
+        *("2 of 100", "9 of 100", "7 points", "–"),
     ]
