@@ -47,7 +47,7 @@ def _in_words(arm: Arm, tables: RunTables) -> str:
         case Arm(ego=ego, non_ego=None) if ego is not None:
             return f"{_ego_in_words(ego, tables.naive)}, without the non-ego"
         case Arm(ego=NaiveEgo(), non_ego=SumoNonEgo()):
-            return f"the {tables.naive} with an ordinary law-abiding SUMO driver in the non-ego's place"
+            return f"the {tables.naive} with an ordinary {tables.person} in the non-ego's place"
         case Arm(ego=RetrainedEgo(against=against) | ReconfiguredEgo(against=against) as ego, non_ego=non_ego) if (
             non_ego is not None and against == strategy_name(non_ego)
         ):

@@ -27,7 +27,7 @@ from harness.reports.page_template import CONTENT_POLICY, ELSEWHERE, LIBRARIES, 
 from harness.reports.provenance import asked_alone
 from harness.reports.run_tables import RunTables
 from harness.reports.start_section import start_section
-from harness.reports.verdict_wording import planned_in_words
+from harness.reports.verdict_wording import as_sentence, planned_in_words
 
 MOST_BROKEN = 3
 """Broken bounds that the first screen shows; the others are folded, so that the answers stay in sight."""
@@ -103,7 +103,7 @@ def render_page(
         unlisted=max(len(tables.replays) - REPLAYS_SHOWN, 0),
         significance=tables.significance,
         asked_alone=asked_alone(tables.manifest),
-        rules=sorted({stage["rule"] for stage in tables.stages.values() if stage.get("rule")}),
+        rules=sorted({as_sentence(stage["rule"]) for stage in tables.stages.values() if stage.get("rule")}),
         glossary=glossary(tables),
         versions=tables.manifest.get("versions", {}),
         game=game_section(tables.game, links),
