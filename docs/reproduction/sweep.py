@@ -50,8 +50,6 @@ class Sweep(Document):
 
     campaign: str
     """The campaign that all settings are variants of, relative to this document."""
-    steps: int = Field(ge=1_000)
-    """Budget of each training, in steps of the learning player."""
     levers: list[Lever] = Field(min_length=1)
 
 
@@ -114,7 +112,6 @@ def _write_campaign(base: Path, sweep: Sweep, setting: Setting, folder: Path) ->
     campaign["personas"] = [files[""].name]
     ego["persona"] = files["ego"].name
     campaign["scene"] = _relative(source, str(campaign["scene"]), folder)
-    _put(campaign, "training.steps", sweep.steps)
     file = folder / "campaign.toml"
     file.write_text(tomlkit.dumps(campaign), encoding="utf-8")
     return file
