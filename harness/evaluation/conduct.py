@@ -60,7 +60,7 @@ def distance_m(drive: Drive) -> float:
     return float(drive.of("advanced_m").sum())
 
 
-@metric("conduct", meaning="Mean speed while it moves.")
+@metric("conduct", meaning=f"Mean speed while it moves, faster than {STANDING_MPS:g} m/s.")
 def moving_speed_mps(drive: Drive) -> float | None:
     speed_mps = drive.of("speed_mps")
     return finite(speed_mps[speed_mps > STANDING_MPS], np.mean)

@@ -14,7 +14,7 @@ from harness.evaluation.competence import WITHHELD, Verdict
 from harness.evaluation.rule_book.causes import cause_lines
 from harness.evaluation.strategies import PAPER_ROUNDS, NaiveEgo, against_persona, round_of
 from harness.reports.embedding import key
-from harness.reports.focus import COMPETENT_SHARE, Focus, focus_of
+from harness.reports.focus import Focus, focus_of, is_competent
 from harness.reports.key_figures import egos_of, prevented_clauses
 from harness.reports.next_steps import NextStep
 from harness.reports.numbers import NO_SPACE, number
@@ -109,7 +109,7 @@ def _why(focus: Focus | None, tables: RunTables) -> Iterator[str]:
             yield f"The {ego} does not fail{where}: the broken bound is of another kind."
     if baseline := tables.manifest.get("baseline"):
         failed, games = tables.counts_of(against_persona(NaiveEgo(), baseline).name)
-        if failed > COMPETENT_SHARE * games and baseline != focus.persona:
+        if not is_competent(failed, games, tables) and baseline != focus.persona:
             yield f"The {tables.naive} also fails against the baseline, {baseline}, in {failed} of {games} games."
 
 

@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from harness.config.campaign import Competence
 from harness.evaluation.comparisons.acceptance_checks import Check, worst_of_each
 from harness.evaluation.strategies import NaiveEgo, NonEgoStrategy, SumoNonEgo, against_persona
 from harness.reports.acceptance_wording import TITLES
 from harness.reports.run_tables import RunTables
-
-COMPETENT_SHARE = 0.03
-"""An ego that fails in no greater share of its games alone, or against an ordinary driver, is competent there: what
-people make it do matters more. Our own: what is left of the default of `[competence] ego_goal_share`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,14 +32,21 @@ class Focus:
 
 
 def focus_of(tables: RunTables) -> Focus | None:
-    """The arm of the naive or a last ego alone, or against an ordinary driver, if the ego fails in more than
-    `COMPETENT_SHARE` of its games; else that of the first broken bound that was measured, of one with failures if there
-    is any; else the one with the most failures among the last egos against their personas; else among the naive ego's;
-    else the first in which the ego fails alone, or against an ordinary driver. None: no ego fails, and no measured
-    bound is broken."""
+    """The arm of the naive or a last ego alone, or against an ordinary driver, if the ego is not competent there
+    (`is_competent`); else that of the first broken bound that was measured, of one with failures if there is any; else
+    the one with the most failures among the last egos against their personas; else among the naive ego's; else the
+    first in which the ego fails alone, or against an ordinary driver. None: no ego fails, and no measured bound is
+    broken."""
     without = list(_without_people(tables))
-    incompetent = [each for each in without if each.failed > COMPETENT_SHARE * tables.counts_of(each.arm)[1]]
+    incompetent = [each for each in without if not is_competent(*tables.counts_of(each.arm), tables)]
     return next(iter([*incompetent, *_with_people(tables), *without]), None)
+
+
+def is_competent(failed: int, games: int, tables: RunTables) -> bool:
+    """Whether an ego reaches its goal in the share of games that `[competence]` of the campaign asks of an ego alone:
+    what people make it do matters more then."""
+    asked = tables.manifest.get("campaign", {}).get("competence", {})
+    return games - failed >= asked.get("ego_goal_share", Competence().ego_goal_share) * games
 
 
 def _without_people(tables: RunTables) -> Iterator[Focus]:

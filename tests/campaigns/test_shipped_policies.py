@@ -92,6 +92,7 @@ def test_merge_seeds__are_the_merge_ten_times() -> None:
     ten, one = (open_campaign(CAMPAIGNS / f"{name}.toml").document for name in ("merge-seeds", "merge"))
     assert ten.model_copy(update={"name": one.name, "seeds": one.seeds, "best_response": None}) == one
     assert len(set(ten.seeds)) == 10
+    assert {*one.seeds} < {*ten.seeds}
 
 
 def test_shipped_policies__each_has_its_model_card_and_was_trained_on_the_scene() -> None:
