@@ -1,5 +1,9 @@
 """The shipped people of a scene: the policies in `policies/<scene>/` of players other than the ego, one for each person
-or one of several persons (`drivers.policy_of_many`)."""
+or one of several persons (`drivers.policy_of_many`).
+
+Their personas are the shipped ones. A persona that has changed since they learned is beside them as it was then, as in
+`policies/<scene>/speedy.toml`, until they learn anew.
+"""
 
 from __future__ import annotations
 
@@ -25,6 +29,7 @@ class People:
     """Persons of a scene who learned with the same training seeds."""
 
     personas: list[str]
+    """By the names of their documents, of those beside the policies by their paths."""
     seeds: list[int]
     together: bool
     """Whether there is one policy of all of them for each seed."""
@@ -34,13 +39,19 @@ def people_of(scene: Path) -> list[People]:
     """The shipped people of a scene."""
     seeds: dict[tuple[str, bool], list[int]] = {}
     for person, together, seed, _ in _policies(scene):
-        seeds.setdefault((person, together), []).append(seed)
+        own = _own_document(scene, person)
+        seeds.setdefault((str(own) if own.is_file() else person, together), []).append(seed)
     groups: dict[tuple[tuple[int, ...], bool], list[str]] = {}
     for (person, together), of_person in seeds.items():
         groups.setdefault((tuple(sorted(of_person)), together), []).append(person)
     return [
         People(personas=personas, seeds=list(own), together=together) for (own, together), personas in groups.items()
     ]
+
+
+def _own_document(scene: Path, person: str) -> Path:
+    """The document beside a person's policies; most have none."""
+    return shipped("policies") / scene.name / f"{person}.toml"
 
 
 def _policies(scene: Path) -> Iterator[tuple[str, bool, int, Path]]:
@@ -106,7 +117,8 @@ def shipped_people(scene: Path) -> tuple[ShippedPerson, ...]:
         folders.setdefault(name, []).append(folder)
     people = []
     for name, own in folders.items():
-        file = named_document(name, "personas")
+        own_document = _own_document(scene, name)
+        file = own_document if own_document.is_file() else named_document(name, "personas")
         person = ShippedPerson(persona=read_document(file, Persona), file=file, folders=tuple(own))
         for folder in own:
             person.policy(folder)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -49,3 +51,34 @@ def test_scenes__count_the_failures_of_each_ego(folder: Path, capsys: pytest.Cap
     assert header.startswith("| scene | sumo | adas | adas with shield rss |")
     assert brake.startswith("| `brake` | 0 of 20 | 1 of 20 | 1 of 20 | 2 of 20 |")
     assert zebra.count("2 of 20") == 2 * len(table.RULES) - 1
+
+
+def test_play__of_some_scenes_replaces_their_rows_and_keeps_all_others(tmp_path: Path) -> None:
+    """First the published league of a scene by itself, then the same one with two failures more."""
+    published, league, part = REPOSITORY / "reports" / "league" / "adas", tmp_path / "adas", tmp_path / "part"
+    shutil.copytree(published, league)
+    part.mkdir()
+    record = json.loads((published / "result.json").read_bytes())
+    for name in ("league", "league_games"):
+        rows = read_csv(published / f"{name}.csv")
+        write_csv(rows[rows["scene"] == "cut_in"], part / f"{name}.csv")
+    (part / "result.json").write_text(json.dumps(record | {"rows": []}))
+    table.replace_scenes(league, part)
+    for name in ("league.csv", "league_games.csv", "result.json"):
+        assert (league / name).read_bytes() == (published / name).read_bytes()
+
+    worse = read_csv(part / "league.csv")
+    worse["failure_rate"] = 1.0
+    write_csv(worse, part / "league.csv")
+    table.replace_scenes(league, part)
+    rows = read_csv(league / "league.csv")
+    assert set(rows["failure_rate"][rows["scene"] == "cut_in"]) == {1.0}
+    assert rows["failure_rate"].is_monotonic_decreasing
+    assert len(rows) == len(record["rows"])
+    assert [each["scene"] for each in json.loads((league / "result.json").read_bytes())["rows"]] == list(rows["scene"])
+
+
+def test_play__a_league_with_games_that_could_not_be_played_replaces_nothing(tmp_path: Path) -> None:
+    (tmp_path / "result.json").write_text(json.dumps({"failed": ["cut_in: 3 games could not be played"]}))
+    with pytest.raises(SystemExit, match="3 games could not be played"):
+        table.replace_scenes(tmp_path, tmp_path)

@@ -50,13 +50,7 @@ def write_league(ego: str, folder: Path, results: Mapping[str, RunResult]) -> Le
     folder."""
     runs = [RunFolder(folder / name) for name in results]
     rows, games = league_rows(ego, [run for run in runs if (run.path / "summary.csv").is_file()])
-    table = table_of("league", rows).sort_values(
-        ["reason", "failure_rate", "serious_injuries", "scene", "person", "seed", "shield"],
-        ascending=[True, False, False, True, True, True, True],
-        key=lambda column: column != "" if column.name == "reason" else column,
-        kind="stable",
-        ignore_index=True,
-    )
+    table = worst_pairings_first(table_of("league", rows))
     write_csv(table, folder / "league.csv")
     write_csv(table_of("league_games", rows), folder / LEAGUE_GAMES)
     addresses = [games[row["scene"], row["arm"], row["seed"]] for row in table.to_dict("records")]
@@ -65,10 +59,25 @@ def write_league(ego: str, folder: Path, results: Mapping[str, RunResult]) -> Le
     _write_junit(ego, folder / JUNIT, table, results)
     # of a league, what fails is that something was not played: it has no bounds
     exit_code = FAILED if failed else 0
-    cells = [{name: _in_json(cell) for name, cell in row.items()} for row in table.to_dict("records")]
-    record = {"ego": ego, "exit_code": exit_code, "failed": failed, "rows": cells, "versions": versions()}
+    record = {"ego": ego, "exit_code": exit_code, "failed": failed, "rows": in_json(table), "versions": versions()}
     write_record(folder / RESULT, record)
     return LeagueResult(table=table, failed=failed, exit_code=exit_code, record=record)
+
+
+def worst_pairings_first(table: pd.DataFrame) -> pd.DataFrame:
+    """The rows of the table `league` in its order."""
+    return table.sort_values(
+        ["reason", "failure_rate", "serious_injuries", "scene", "person", "seed", "shield"],
+        ascending=[True, False, False, True, True, True, True],
+        key=lambda column: column != "" if column.name == "reason" else column,
+        kind="stable",
+        ignore_index=True,
+    )
+
+
+def in_json(table: pd.DataFrame) -> list[dict[str, Any]]:
+    """The rows of the table as `result.json` has them."""
+    return [{name: _in_json(cell) for name, cell in row.items()} for row in table.to_dict("records")]
 
 
 def _in_json(cell: Any) -> Any:
