@@ -75,7 +75,7 @@ def game_table(run: Path, chosen: GameList) -> Table:
     )
     for name in ("arm", "seed", "episode", *players, "cause", "TTC (s)", "severity"):
         heading = name.replace("non_ego", "non-ego").replace("_", " ")
-        table.add_column(heading, overflow="fold", no_wrap=name in ("arm", *players))
+        table.add_column(heading, overflow="fold", no_wrap=name not in ("arm", "cause"))
     for game in games.itertuples():
         ttc = "" if pd.isna(game.ego_min_ttc_s) else f"{game.ego_min_ttc_s:.1f}"
         severity = "" if math.isinf(game.severity) else f"{game.severity:.1f}"

@@ -15,8 +15,8 @@ from harness.campaign.results.replay_game import GameList, film, game_table, pla
 from harness.campaign.results.results import write_results
 from harness.campaign.storage.run_folder import RunFolder
 from harness.errors import UsageError
-from harness.evaluation.tables import table_of, write_csv
-from harness.evaluation.worst_first import replay_name
+from harness.evaluation.tables import read_csv, table_of, write_csv
+from harness.evaluation.worst_first import replay_name, worst_first
 from tests.support.pictures import require_gui
 
 
@@ -40,6 +40,18 @@ def test_list__has_the_cause_of_each_failure(run: Path) -> None:
     shutil.rmtree(run / ".stages")  # its checksums
     (line,) = [each for each in printed(run).splitlines() if "cut-in -> brakes" in each]
     assert line.split()[:3] == ["naive_vs_speedy", "1", "2"]
+
+
+def test_list__in_a_narrow_terminal_breaks_the_arm_and_the_cause_and_no_number(run: Path) -> None:
+    arm = "naive_vs_speedy_with_estimation_of_careful"
+    episodes = read_csv(run / "episodes.csv")
+    episodes["arm"] = episodes["arm"].replace("naive_vs_speedy", arm)
+    write_csv(episodes, run / "episodes.csv")
+    shutil.rmtree(run / ".stages")  # its checksums
+    lines = printed(run, arm, width=80).splitlines()
+    title = next(number for number, line in enumerate(lines) if not line.strip())  # as many lines as its path needs
+    assert lines[title + 1].split() == ["arm", "seed", "episode", "ego", "non-ego", "cause", "TTC", "(s)", "severity"]
+    assert lines[title + 3].split()[1:3] == ["1", str(worst_first(episodes[episodes["arm"] == arm])["episode"].iloc[0])]
 
 
 def test_report__makes_tables_of_the_log_anew_without_playing_a_game(run: Path) -> None:
