@@ -73,8 +73,8 @@ def test_open_scene__a_vehicle_with_the_follower_s_name_is_refused(tmp_path: Pat
 
 
 def test_shipped_scenes__somebody_follows_in_half_of_their_games() -> None:
-    """Not where a person walks, follows, or waits inside the junction, nor in the paper with two cars; always where that
-    is what it is about."""
+    """Not where a person walks, follows, or waits inside the junction, nor in the paper with two cars; always where a
+    scene is about it."""
     scenes = {each.name: open_scene(each) for each in sorted((REPOSITORY / "networks").iterdir()) if each.is_dir()}
     others = {name: share for name, scene in scenes.items() if (share := scene.document.share_followed) != 0.5}
     without = ("crossing", "merge_convoy", "oncoming_bypass", "paper_merge", "zebra")
