@@ -18,7 +18,7 @@ from harness.drivers.policy_file import LearnedDriver, Policy, persona_hash, pol
 from harness.drivers.policy_of_many import as_persona, personas_in, read_policy_of_many
 from harness.errors import UsageError
 from harness.game.roles import EGO, ROLES
-from harness.shipped_documents import named_document, shipped
+from harness.shipped_documents import find_document, shipped
 
 SEED = "-seed"
 """Between the name and the training seed of a policy."""
@@ -39,8 +39,9 @@ def people_of(scene: Path) -> list[People]:
     """The shipped people of a scene."""
     seeds: dict[tuple[str, bool], list[int]] = {}
     for person, together, seed, _ in _policies(scene):
-        own = _own_document(scene, person)
-        seeds.setdefault((str(own) if own.is_file() else person, together), []).append(seed)
+        document = _document(scene, person)
+        named = person if document.parent == shipped("personas").resolve() else str(document)
+        seeds.setdefault((named, together), []).append(seed)
     groups: dict[tuple[tuple[int, ...], bool], list[str]] = {}
     for (person, together), of_person in seeds.items():
         groups.setdefault((tuple(sorted(of_person)), together), []).append(person)
@@ -49,9 +50,9 @@ def people_of(scene: Path) -> list[People]:
     ]
 
 
-def _own_document(scene: Path, person: str) -> Path:
-    """The document beside a person's policies; most have none."""
-    return shipped("policies") / scene.name / f"{person}.toml"
+def _document(scene: Path, person: str) -> Path:
+    """The document of a person's persona: the one beside its policies if there is one, else the shipped one."""
+    return find_document(person, shipped("policies") / scene.name, "personas")
 
 
 def _policies(scene: Path) -> Iterator[tuple[str, bool, int, Path]]:
@@ -117,8 +118,7 @@ def shipped_people(scene: Path) -> tuple[ShippedPerson, ...]:
         folders.setdefault(name, []).append(folder)
     people = []
     for name, own in folders.items():
-        own_document = _own_document(scene, name)
-        file = own_document if own_document.is_file() else named_document(name, "personas")
+        file = _document(scene, name)
         person = ShippedPerson(persona=read_document(file, Persona), file=file, folders=tuple(own))
         for folder in own:
             person.policy(folder)

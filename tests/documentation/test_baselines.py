@@ -54,7 +54,7 @@ def test_scenes__count_the_failures_of_each_ego(folder: Path, capsys: pytest.Cap
 
 
 def test_play__of_some_scenes_replaces_their_rows_and_keeps_all_others(tmp_path: Path) -> None:
-    """First the published league of a scene by itself, then the same one with two failures more."""
+    """First the published league of a scene by itself, then one in which the ego fails every game of it."""
     published, league, part = REPOSITORY / "reports" / "league" / "adas", tmp_path / "adas", tmp_path / "part"
     shutil.copytree(published, league)
     part.mkdir()
