@@ -10,7 +10,8 @@ from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator,
 
 from harness.config.scene import Name
 from harness.config.toml_reading import NUMBER, TABLE, Document, Mistakes, nearest, one_of, ordered
-from harness.game.human_factors import ActuatorShares, Attention, Controls, HumanFactors, Reaction, Sight
+from harness.game.human_factors import ActuatorShares, HumanFactors, Reaction, Sight
+from harness.game.lapses import Attention, Controls
 from harness.game.payoff import FuzzyFunction, FuzzySet, Payoff, Weighted
 from harness.game.payoff_terms import FUZZY_QUANTITIES, GROUPS, NEARNESS, TERMS
 
@@ -159,7 +160,8 @@ class AttentionLapses(Document):
     """`uniform`: within the range. `lognormal`: the range holds the middle 90 % of the lapses."""
     controls: Controls = "released"
     """What happens to pedals and wheel in a lapse. `released`: the car coasts with a straight wheel. `held`: the pedals
-    stay as they are, and the wheel follows the road, as in a glance at a telephone."""
+    stay as they are, and the wheel follows the road, as in a glance at a telephone, which ends where the time to
+    collision with the vehicle ahead is 4 s or less."""
     bump_steering_sd_rad: float = Field(0.0, ge=0.0, le=0.1)
     """Standard deviation, from lapse to lapse, of the steering angle that bumps and the car's own pull give the
     wheel."""

@@ -18,15 +18,14 @@ from harness.game.human_factors import (
     NO_LIMITS,
     ActuatorShares,
     HumanFactors,
-    Lapses,
     Limits,
     Reaction,
     Sight,
     autocorrelated,
     draw_estimation_errors,
-    draw_lapses,
     glances_over_shoulder,
 )
+from harness.game.lapses import Lapses, draw_lapses
 from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles
 from harness.game.road import Routes
 from harness.game.roles import EGO

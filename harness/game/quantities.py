@@ -161,6 +161,17 @@ class Quantities:
         return self.leader_gap_m / np.maximum(self.state.speed_mps, 0.1)
 
     @cached_property
+    def leader_ttc_s(self) -> FloatArray:
+        """Time to collision with the leader at constant speeds; inf without a leader, or if the gap does not close."""
+        bodies, leader = self.bodies, np.maximum(self.leader, 0)
+        speed_mps, heading_rad = (
+            np.take_along_axis(of, leader, 1) for of in (bodies.speed_mps, bodies.boxes.heading_rad)
+        )
+        closing_mps = self.state.speed_mps - speed_mps * np.cos(heading_rad - self.state.heading_rad)
+        ttc_s = self.leader_gap_m / np.maximum(closing_mps, 1e-3)
+        return np.where((self.leader >= 0) & (closing_mps > 0.0), ttc_s, np.inf)
+
+    @cached_property
     def meetings(self) -> Meetings:
         """Each player's conflict with each body at a junction."""
         state, bodies, tables = self.state, self.bodies, self.world.right_of_way

@@ -13,7 +13,7 @@ from typing import Any
 from harness.evaluation.comparisons.arm_clauses import Beside, by_criterion, harm_clauses, near_misses
 from harness.evaluation.comparisons.comparison import HARM, SHARES
 from harness.evaluation.strategies import Arm, EgoStrategy, PersonaNonEgo
-from harness.game.human_factors import Attention
+from harness.game.lapses import Attention
 from harness.game.roles import NON_EGO
 from harness.reports.differences import NO_RELEVANT_DIFFERENCE, faster_by, is_equivalent
 from harness.reports.numbers import NO_SPACE, number, percent, sure

@@ -21,8 +21,9 @@ from harness.environments.arena import Arena, Seat
 from harness.evaluation.columns import TABLES
 from harness.evaluation.tables import typed
 from harness.game.arrays import FloatArray, IntArray
-from harness.game.human_factors import Attention, HumanFactors
+from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import InitialState, draw_initial_state
+from harness.game.lapses import Attention
 from harness.road.scene.open_scene import OpenScene
 from tests.support.rollouts import Steady
 

@@ -15,24 +15,22 @@ from harness.evaluation.rule_book.course import runs
 from harness.game.arrays import FloatArray
 from harness.game.human_factors import (
     NO_LIMITS,
-    Attention,
     HumanFactors,
-    Lapses,
     Limits,
+    PlayersLimits,
     Reaction,
     Sight,
     draw_estimation_errors,
-    draw_lapses,
     glances_over_shoulder,
-    held_steering_rad,
 )
 from harness.game.initial_state import InitialState, draw_initial_state
+from harness.game.lapses import Attention, Lapses, PlayersLapses, draw_lapses, held_steering_rad, lags
 from harness.game.observation_layout import LAYOUT, in_units
 from harness.game.state import State
 from harness.game.world import World
 from harness.road.scene.open_scene import OpenScene
 from tests.support.moments import Moment, car, seen
-from tests.support.scenes import drawn
+from tests.support.scenes import LEFT_Y, drawn, placed
 
 
 @pytest.fixture(scope="module")
@@ -86,21 +84,20 @@ def test_reaction__others_are_taken_to_move_on_as_they_did(arena: Arena, straigh
 
 def test_reaction__a_lapse_stops_what_is_known() -> None:
     lapsed = np.array([False, False, True, True, True, False, False, False])
-    lapses = Lapses(lapsed, np.zeros(8))
-    assert lapses.lags(0).tolist() == [0, 0, 1, 2, 3, 0, 0, 0]
+    assert lags(lapsed, 0).tolist() == [0, 0, 1, 2, 3, 0, 0, 0]
     # two steps late: in step 5 what was known in step 3, which is that of step 1
-    assert lapses.lags(2).tolist() == [0, 1, 2, 2, 3, 4, 5, 2]
+    assert lags(lapsed, 2).tolist() == [0, 1, 2, 2, 3, 4, 5, 2]
 
 
 @settings(max_examples=50, deadline=None)
 @given(seed=st.integers(0, 2**32), delay=st.integers(0, 30))
 def test_reaction__nothing_is_known_sooner_or_of_before_the_game(seed: int, delay: int) -> None:
     attention = Attention(mean_attentive_s=3.0, lapse_s=(0.5, 2.0))
-    lags = draw_lapses(attention, 200, 0.1, np.random.default_rng(seed)).lags(delay)
+    late = lags(draw_lapses(attention, 200, 0.1, np.random.default_rng(seed)).lapsed, delay)
     steps = np.arange(200)
-    assert (lags <= steps).all()
-    assert (lags >= np.minimum(delay, steps)).all()
-    assert (np.diff(steps - lags) >= 0).all()  # what was known is not forgotten
+    assert (late <= steps).all()
+    assert (late >= np.minimum(delay, steps)).all()
+    assert (np.diff(steps - late) >= 0).all()  # what was known is not forgotten
 
 
 def body_limits(straight: OpenScene, human_factors: HumanFactors, games: int) -> list[Limits]:
@@ -309,6 +306,37 @@ def test_lapses__released_or_held(arena: Arena, straight: OpenScene) -> None:
         assert steering[0] == pytest.approx([0.0, 0.0], abs=1e-9)
     released_mps2 = [each[0][0, 0] for each in played_steps[1:]]
     assert (np.diff(np.abs(released_mps2)) < 0.0).all()  # it fades with the lag of the pedals
+
+
+@pytest.mark.parametrize(("ahead_mps", "ends"), [(5.0, True), (10.0, False)])
+def test_glance__ends_where_the_car_closes_in_on_the_one_ahead(
+    arena: Arena, straight: OpenScene, ahead_mps: float, ends: bool
+) -> None:
+    """A car at 10 m/s, 25 m behind another, in a glance from the first step on. At 5 m/s the other is 4 s ahead in the
+    step in which 20 m are left, after 1 s; where it is as fast, the glance goes on."""
+    length_m = straight.world.length_m
+    ahead_m = 100.0 + 25.0 + 0.5 * (length_m[0] + length_m[1])
+    start = placed(straight, (100.0, LEFT_Y, 0.0, 10.0), (ahead_m, LEFT_Y, 0.0, ahead_mps))
+    steps = straight.world.steps
+    glance = Lapses(np.ones(steps, dtype=bool), np.zeros(steps), held=True)
+    arena.reset({0: replace(start, lapses=(glance, Lapses.none(steps))), 1: start})
+    lapsed = []
+    for _ in range(15):
+        arena.step(np.zeros((2, 2, 2)))
+        lapsed.append(bool(arena.state.lapsed[0, 0]))
+    attentive_from = lapsed.index(False) if False in lapsed else None
+    assert attentive_from == (pytest.approx(10, abs=1) if ends else None)
+    assert not any(lapsed[attentive_from:] if ends else [])
+
+
+def test_glance__that_ends_is_followed_by_the_reaction_time() -> None:
+    """A glance from step 2 on ends in step 4: two steps later the player knows what it then saw."""
+    lapses, limits = PlayersLapses(1, 1, 8), PlayersLimits(1, 1, 8)
+    glance = Lapses(np.arange(8) >= 2, np.zeros(8), held=True)
+    lapses.reset(0, 0, glance)
+    limits.reset(0, 0, Limits(delay_steps=2), glance, State.empty(1, 1))
+    limits.set_lapsed(0, 0, lapses.end(0, 0, 4))
+    assert [int(limits.lags(np.array([step]))[0, 0]) for step in range(8)] == [0, 1, 2, 2, 3, 4, 2, 2]
 
 
 def test_shoulder_glance__is_missing_in_its_share_of_the_games() -> None:

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harness.game.human_factors import Attention, HumanFactors, Reaction, Sight
+from harness.game.human_factors import HumanFactors, Reaction, Sight
 from harness.game.initial_state import InitialState, StartDistribution, draw_initial_state
+from harness.game.lapses import Attention
 from harness.game.seeding import seed_of
 from harness.game.start_range import OnLine, StartRange
 from harness.road.scene.open_scene import OpenScene

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from harness.game.arrays import FloatArray
-from harness.game.human_factors import Attention, HumanFactors, Reaction
+from harness.game.human_factors import HumanFactors, Reaction
 from harness.game.initial_state import InitialState, draw_initial_state
+from harness.game.lapses import Attention
 from harness.game.placed_obstacles import NO_OBSTACLES
 from harness.game.road import Routes
 from harness.game.start_range import draw_along_route

@@ -13,7 +13,7 @@ from rich.console import Console
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.errors import UsageError
-from harness.game.human_factors import Attention, draw_lapses
+from harness.game.lapses import Attention, draw_lapses
 from harness.game.payoff_terms import GROUPS, TERMS
 from harness.reports.page_template import write_page
 from harness.reports.persona.drives import DRIFT_SPEED_MPS, drift_m, free_share, lapsed_share, lapses_per_minute

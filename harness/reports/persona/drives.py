@@ -9,7 +9,8 @@ import numpy as np
 
 from harness.config.persona import Persona
 from harness.config.road_user import Actuators
-from harness.game.human_factors import Attention, Lapses, draw_lapses, glances_over_shoulder
+from harness.game.human_factors import glances_over_shoulder
+from harness.game.lapses import Attention, Lapses, draw_lapses
 from harness.game.seeding import generator_of
 
 DRIVES, DRIVE_S, STEP_S = 8, 60.0, 0.1

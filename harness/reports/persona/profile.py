@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from harness.config.persona import Persona
 from harness.game.human_factors import BLIND_BEHIND_M, BLIND_BESIDE_M, PERSISTENCE_S
+from harness.game.lapses import NOTICED_TTC_S
 from harness.game.payoff_terms import GROUPS
 from harness.reports.persona.drives import (
     DRIFT_SPEED_MPS,
@@ -32,7 +33,10 @@ COLLISION_IS_FREE = "A collision itself costs nothing."
 NO_LAPSES = "Attention never lapses."
 IN_A_LAPSE = {
     "released": "In a lapse the person releases pedals and wheel.",
-    "held": "In a lapse the person holds the pedals, and the wheel follows the road.",
+    "held": (
+        "In a lapse the person holds the pedals, and the wheel follows the road. The lapse ends where the time to "
+        f"collision with the vehicle ahead is {NOTICED_TTC_S:g} s or less."
+    ),
 }
 ALWAYS_GLANCES = "The person glances over the shoulder in every drive."
 AFTER_A_LAPSE = "After a lapse, the others are taken for the same time to move on as before it."
