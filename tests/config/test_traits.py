@@ -31,7 +31,8 @@ def test_traits__each_key_of_a_persona_is_in_one_trait_or_in_none_on_purpose() -
     ("name", "traits"),
     [
         ("careful", ()),
-        ("speedy", ("payoff", "decisions", "shoulder_glance")),
+        ("speedy", ("payoff", "shoulder_glance")),
+        ("paper_speedy", ("payoff", "decisions", "shoulder_glance")),
         ("texting", ("payoff", "attention")),
     ],
 )

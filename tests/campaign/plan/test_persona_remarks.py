@@ -24,14 +24,14 @@ def test_waiting_cost__is_the_discounted_sum_over_the_steps() -> None:
     assert waiting_cost(shipped("speedy"), world, 1.0) == pytest.approx(0.8 * world.time_limit_s)
     # time_pressure 0.5 and speed_under_limit 1 a second; nothing for speeding
     assert waiting_cost(shipped("impatient"), world, 1.0) == pytest.approx(1.5 * world.time_limit_s)
-    assert crash_cost(shipped("speedy")) == 5.0
+    assert crash_cost(shipped("speedy")) == 20.0
 
 
 @pytest.mark.parametrize(
     ("scene", "persona", "remark"),
     [
-        ("merge", "speedy", "warning: speedy: a crash costs 5, and standing for long behind somebody 7.86"),
-        ("merge", "texting", None),
+        ("merge", "paper_speedy", "warning: paper_speedy: a crash costs 5, and standing for long behind somebody 7.86"),
+        ("merge", "speedy", None),
         (
             "left_across",
             "late_merger",
