@@ -143,11 +143,12 @@ class Attribution(Document):
 
 
 class Competence(Document):
-    """What a player has to achieve without the other player before its results count. A question about players of which
-    one achieves less is not answered, and a training that made such a player is reported as `did not learn`."""
+    """What a player has to achieve without people before its results count. A question about players of which one
+    achieves less is not answered, and a training that made such a player is reported as `did not learn`."""
 
     ego_goal_share: float = Field(0.97, ge=0.0, le=1.0)
-    """Least share of its games alone in which an ego reaches its goal. 0: not asked of egos."""
+    """Least share of its games alone in which an ego reaches its goal. A learned naive ego has to reach it as often
+    beside SUMO's driver, unless it learned without it (`naive_training.alone_share = 1`). 0: not asked of egos."""
     non_ego_goal_share: float = Field(0.8, ge=0.0, le=1.0)
     """Least share of its games alone in which a non-ego reaches its goal. 0: not asked of non-egos."""
     non_ego_like_people: bool = True

@@ -1,10 +1,11 @@
 """The research questions on two arms with their possible answers, and the gates before them.
 
-A verdict counts only if its players reach their goals without the other player.
+A verdict counts only if its players reach their goals without each other.
 A person that wrecks itself on the empty road and an ego that fails against everybody answer no research question. So
-every question names the least share of goals of its players alone (`AloneBound`, from the campaign's table
-`[competence]`). The share is measured in the arms in which they are assessed alone, by the point estimate: goals per
-game that could be played. A goal of an ego that passed a red light, or drove among oncoming lanes, does not count.
+every question names the least share of goals of its players alone, and of a naive ego that learned beside SUMO's driver
+there, too (`AloneBound`, from the campaign's table `[competence]`). The share is measured in the arms in which they are
+assessed so, by the point estimate: goals per game that could be played. A goal of an ego that passed a red light, or
+drove among oncoming lanes, does not count.
 
 A question about a person that drives unlike people is not answered either (`Question.unlike_people`).
 """
@@ -24,17 +25,22 @@ if TYPE_CHECKING:
 ResearchQuestion = Literal["RQ1", "RQ2"]
 
 
+ALONE = "alone"
+
+
 @dataclass(frozen=True, kw_only=True)
 class AloneBound:
-    """What a player has to achieve without the other player before a verdict on it counts."""
+    """What a player has to achieve without the other player of a question before a verdict on it counts."""
 
     player: Literal["ego", "non_ego"]
     words: str
     """The player in sentences, such as "the naive ego"."""
     arm: str
-    """The arm in which it drives alone."""
+    """The arm in which it drives alone, or beside SUMO's driver."""
     goal_share: float
     """The least share of that arm's games in which it reaches its goal."""
+    where: str = ALONE
+    """Who else is in that arm, in sentences."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +99,7 @@ WITHHELD = frozenset(
 """The verdicts on players about which a question is not answered."""
 
 DID_NOT_LEARN = "did not learn"
-"""How a training ended whose player misses its bound alone, whatever stopped it."""
+"""How a training ended whose player misses one of its bounds, whatever stopped it."""
 RULES: Mapping[str, tuple[str, str, float]] = {
     "on_red": ("passing a red light", "ego_red_lights", 1.0),
     "wrong_way": ("driving among oncoming lanes", "ego_wrong_way_s", WRONG_WAY_LEAST_S),
@@ -127,14 +133,14 @@ class Goals:
         """Whether there are games, and their share of goals is not below this."""
         return self.played > 0 and self.goals / self.played >= least_share
 
-    def below(self, least_share: float) -> str:
-        """The share and its bound, as a clause."""
+    def below(self, least_share: float, where: str = ALONE) -> str:
+        """The share and its bound, as a clause; `where` as in `AloneBound`."""
         percent = int(self.goals / max(self.played, 1) * 1000) / 10  # rounded down: below stays below
         broken = "".join(
             f", and in {vars(self)[rule]} more after {words}" for rule, (words, *_) in RULES.items() if vars(self)[rule]
         )
         counts = f"{self.goals} of {self.played} games ({percent:g} %){broken}"
-        return f"alone it reaches its goal in {counts}, below {round(least_share * 100, 10):g} %"
+        return f"{where} it reaches its goal in {counts}, below {round(least_share * 100, 10):g} %"
 
 
 def goals_alone(games: pd.DataFrame | None, player: Literal["ego", "non_ego"]) -> Goals:
@@ -177,7 +183,7 @@ def gate(bounds: Iterable[AloneBound], seed: int, games: Mapping[Any, pd.DataFra
             continue
         if goals.played:
             incapable.add(bound.player)
-            clauses.append(f"{bound.words} can't drive this scene: {goals.below(bound.goal_share)}")
+            clauses.append(f"{bound.words} can't drive this scene: {goals.below(bound.goal_share, bound.where)}")
         else:
             unknown = f"so it is not known how {bound.words} drives"
             why = (

@@ -10,7 +10,7 @@ import pandas as pd
 from markupsafe import Markup
 
 from harness.config.training import ATTENTIVE_SHARE, Training
-from harness.evaluation.competence import DID_NOT_LEARN
+from harness.evaluation.competence import ALONE, DID_NOT_LEARN
 from harness.evaluation.strategies import ManyPersonas, NaiveEgo, PersonaNonEgo, Strategy, player_of
 from harness.game.roles import EGO
 from harness.reports.figures import INK, SERIES, figure_of, svg
@@ -145,7 +145,7 @@ def stopped(stage: Mapping[str, Any]) -> str:
     text = {"converged": "early: converged", "budget": "budget used", None: MISSING}.get(reason, str(reason))
     if reason == DID_NOT_LEARN and stage.get("played"):
         asked = f"at least {percent(stage['goal_share_asked'])}"
-        text += f": goal in {stage['goals']} of {stage['played']} games alone, {asked} asked"
+        text += f": goal in {stage['goals']} of {stage['played']} games {stage.get('where') or ALONE}, {asked} asked"
     if reason == DID_NOT_LEARN and stage.get("failing_roads"):
         text += f"; most of its last games alone failed on {', '.join(stage['failing_roads'])}"
     return text

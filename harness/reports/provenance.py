@@ -87,7 +87,8 @@ def asked_alone(manifest: Mapping[str, Any]) -> str:
     if not bounds:
         return ""
     return (
-        f"A question is answered only if its players reach their goals alone in a share of games: {', '.join(bounds)}."
+        f"A question is answered only if its players reach their goals alone in a share of games: {', '.join(bounds)}. "
+        "A naive ego that learned beside an ordinary road user has to do so there, too."
     )
 
 

@@ -128,6 +128,15 @@ def test_gate__players_that_were_not_played_alone_are_not_taken_on_trust() -> No
     assert "no game of the arm speedy_alone could be played" in gate(RQ1.alone, 1, games_by_arm(unplayed))["reason"]
 
 
+def test_gate__an_ego_that_fails_against_everybody_answers_nothing() -> None:
+    bound = replace(RQ1.alone[0], arm="naive_vs_sumo", where="beside anybody")
+    games = games_by_arm(arm("naive_vs_sumo", ego=["goal"] * 4 + ["rail"]))
+    found = gate([bound], 1, games)
+    assert found["verdict"] == Verdict.EGO_CANNOT_DRIVE.value
+    words = "beside anybody it reaches its goal in 4 of 5 games (80 %), below 97 %"
+    assert found["reason"] == f"the naive ego can't drive this scene: {words}"
+
+
 def test_gate__a_bound_of_0_asks_nothing() -> None:
     free = [AloneBound(player="ego", words="the naive ego", arm="naive_alone", goal_share=0.0)]
     assert gate(free, 1, {}) == gate([], 1, {}) == {"verdict": "", "reason": ""}

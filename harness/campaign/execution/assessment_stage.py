@@ -101,7 +101,7 @@ def carry_out_assessment(stage: AssessmentStage, run: StageRun, scene: OpenScene
     games = arm_tables(folder, stage.id, scene).episodes
     facts: dict[str, Any] = {"episodes": len(games), "errors": int((games["error"] != "").sum())}
     facts |= {"versions": [versions_of_numbers()], **choice}
-    if not all(stage.sides):  # whether the training of the player that drives alone succeeded
+    if stage.is_without_people:  # whether the training of the player succeeded
         facts |= goals_alone(games, "ego" if stage.ego else "non_ego").record()
     return facts, [played, traces]
 

@@ -30,6 +30,7 @@ from harness.evaluation.strategies import (
     ReconfiguredEgo,
     RetrainedEgo,
     Strategy,
+    SumoNonEgo,
     player_of,
     strategy_name,
 )
@@ -209,6 +210,11 @@ class AssessmentStage(_Stage):
     @property
     def sides(self) -> tuple[Side, Side]:
         return self.ego, self.non_ego
+
+    @property
+    def is_without_people(self) -> bool:
+        """Whether a player drives alone, or an ego beside SUMO's driver: what it achieves here is its own doing."""
+        return not all(self.sides) or isinstance(self.arm.non_ego, SumoNonEgo)
 
     @property
     def is_untrained(self) -> bool:

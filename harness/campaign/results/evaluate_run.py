@@ -115,9 +115,9 @@ def _figures_of_people(scene: OpenScene) -> tuple[HumanFigure, ...]:
 
 
 def _goals(run: ReadRun) -> dict[str, Goals]:
-    """How often the player of each arm without another player reached its goal, by the arm's stage."""
+    """How often the player of each arm without people reached its goal, by the arm's stage."""
     games = games_by_arm(run.episodes)
-    alone = [each for each in run.stages if isinstance(each, AssessmentStage) and not all(each.sides)]
+    alone = [each for each in run.stages if isinstance(each, AssessmentStage) and each.is_without_people]
     return {each.id: goals_alone(games.get((each.name, each.seed)), "ego" if each.ego else "non_ego") for each in alone}
 
 

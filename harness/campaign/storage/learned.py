@@ -1,9 +1,10 @@
 """Which trainings made a player that can drive the scene: the manifest's judgement of each training.
 
 A training ends when its curve is flat or its budget is used. Neither says that something was learned. What was learned
-shows in the arm in which the player is assessed alone, without exploration and over the starts of every other arm. The
-curve can't show it: its games explore, some are played against the opponent, and their failures may be the opponent's.
-Of further roads, on which no arm is played, the last games alone of the training tell whether most of them fail.
+shows in the arms in which the player is assessed alone, or beside SUMO's driver if it learned beside it, without
+exploration and over the starts of every other arm. The curve can't show it: its games explore, some are played against
+the opponent, and their failures may be the opponent's. Of further roads, on which no arm is played, the last games
+alone of the training tell whether most of them fail.
 """
 
 from __future__ import annotations
@@ -11,10 +12,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from harness.campaign.plan.alone_bounds import bound_of
+from harness.campaign.plan.alone_bounds import bounds_of
 from harness.campaign.plan.stages import ConditioningStage, Stage, TrainingStage, stage_id
 from harness.config.campaign import Campaign
-from harness.evaluation.competence import DID_NOT_LEARN, Goals
+from harness.evaluation.competence import ALONE, DID_NOT_LEARN, Goals
 
 _JUDGEMENT = ("goals", "played", "goal_share_asked")
 
@@ -30,8 +31,9 @@ def judged(
 ) -> Entries:
     """A manifest's entries, with the judgement of each training that is done and whose player was assessed alone.
 
-    `goals` are those of the arms by the id of their stage. An entry gets `goals`, `played` and `goal_share_asked`; the
-    reason in `stopped` becomes `DID_NOT_LEARN` where the goals do not suffice, and where most games on a road fail.
+    `goals` are those of the arms by the id of their stage. An entry gets `goals`, `played`, `goal_share_asked` and
+    `where` of the first arm in which the goals do not suffice, or else of the first one. The reason in `stopped`
+    becomes `DID_NOT_LEARN` where they do not suffice, and where most games on a road fail.
     """
     found = {name: dict(entry) for name, entry in entries.items()}
     for stage in stages:
@@ -40,15 +42,16 @@ def judged(
             continue
         if entry.get("steps") is None:  # it was trained in another run
             continue
-        bound = bound_of(campaign, stage)
-        if bound is not None and entry.get("failing_roads"):
+        bounds = bounds_of(campaign, stage)
+        if bounds and entry.get("failing_roads"):
             found[stage.id]["stopped"] = DID_NOT_LEARN
-        alone = goals.get(stage_id(bound.arm, stage.seed)) if bound is not None else None
-        if bound is None or alone is None or not alone.played:
-            continue
-        found[stage.id] |= alone.record() | {"goal_share_asked": bound.goal_share}
-        if not alone.suffice(bound.goal_share):
+        reached = [(each, goals.get(stage_id(each.arm, stage.seed))) for each in bounds]
+        played = [(each, of_arm) for each, of_arm in reached if of_arm is not None and of_arm.played]
+        missed = [(each, of_arm) for each, of_arm in played if not of_arm.suffice(each.goal_share)]
+        if missed:
             found[stage.id]["stopped"] = DID_NOT_LEARN
+        for each, of_arm in (missed or played)[:1]:
+            found[stage.id] |= of_arm.record() | {"goal_share_asked": each.goal_share, "where": each.where}
     return found
 
 
@@ -72,8 +75,8 @@ def did_not_learn(entries: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
 
 def _shortfalls(entry: Mapping[str, Any]) -> Iterator[str]:
     if None not in (entry.get(key) for key in _JUDGEMENT):
-        alone, asked = Goals.recorded(entry), entry["goal_share_asked"]
-        if not alone.suffice(asked):
-            yield alone.below(asked)
+        goals, asked = Goals.recorded(entry), entry["goal_share_asked"]
+        if not goals.suffice(asked):
+            yield goals.below(asked, entry.get("where", ALONE))
     if roads := entry.get("failing_roads"):
         yield f"at the end of its training most games alone fail on {', '.join(roads)}"

@@ -60,12 +60,13 @@ class StageEntry(_Record):
     chosen: Text | None = None
     """Of a selection, and of an arm with a best response: the training whose policy was taken."""
     goals: Count | None = None
-    """Of an arm in which a player drives alone, and of the training that made the player: games that it ended at its
-    goal."""
+    """Of an arm without people, and of the training that made its player: games that the player ended at its goal."""
     played: Count | None = None
     """The games of that arm that could be played."""
     goal_share_asked: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
     """Of a training: the least share of these games for its player to have learned."""
+    where: Text | None = None
+    """Of a training: who else drove in these games, as of `AloneBound`."""
     failing_roads: list[Text] = Field([])
     """Of a training: the further scenes on which most of its last games alone failed."""
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from harness.campaign.plan.alone_bounds import alone_bounds, bound_of
+from harness.campaign.plan.alone_bounds import alone_bounds, bounds_of
 from harness.campaign.plan.paper_rounds import questions
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage, TrainingStage
@@ -26,6 +26,8 @@ from harness.evaluation.strategies import (
 from tests.support.plans import campaign_of
 
 ANNA = PersonaNonEgo(persona="anna")
+NAIVE = ["naive_alone", "naive_vs_sumo"]
+"""The arms of a naive ego that learned alone and beside SUMO's driver."""
 
 
 def campaign(**changes: Any) -> Campaign:
@@ -45,9 +47,9 @@ RACE = {
 @pytest.mark.parametrize(
     ("arm", "alone"),
     [
-        (Arm(ego=NaiveEgo()), {"naive_alone"}),
-        (Arm(ego=NaiveEgo(), non_ego=ANNA), {"naive_alone", "anna_alone"}),
-        (Arm(ego=NaiveEgo(), non_ego=SumoNonEgo()), {"naive_alone"}),  # SUMO's driver is not played alone
+        (Arm(ego=NaiveEgo()), {*NAIVE}),
+        (Arm(ego=NaiveEgo(), non_ego=ANNA), {*NAIVE, "anna_alone"}),
+        (Arm(ego=NaiveEgo(), non_ego=SumoNonEgo()), {*NAIVE}),  # SUMO's driver is not played alone
         (Arm(ego=RetrainedEgo(against="anna"), non_ego=ANNA), {"retrained_alone_anna", "anna_alone"}),
         (Arm(ego=ReconfiguredEgo(against="anna"), non_ego=ANNA), {"reconfigured_alone_anna", "anna_alone"}),
         (Arm(ego=RobustEgo(), non_ego=ANNA), {"robust_alone", "anna_alone"}),
@@ -56,7 +58,7 @@ RACE = {
             Arm(ego=RetrainedEgo(against="anna", round=4), non_ego=PersonaNonEgo(persona="anna", round=3)),
             {"retrained_anna_round4_alone", "anna_round3_alone"},
         ),
-        (Arm(ego=NaiveEgo(), non_ego=PersonaNonEgo(persona="town")), {"naive_alone", "anna_alone", "bert_alone"}),
+        (Arm(ego=NaiveEgo(), non_ego=PersonaNonEgo(persona="town")), {*NAIVE, "anna_alone", "bert_alone"}),
     ],
 )
 def test_bounds__of_an_arm_are_asked_in_the_arms_of_its_players_alone(arm: Arm, alone: set[str]) -> None:
@@ -68,9 +70,16 @@ def test_bounds__of_an_arm_are_asked_in_the_arms_of_its_players_alone(arm: Arm, 
 
 def test_bounds__are_the_campaigns() -> None:
     asked = campaign(competence={"ego_goal_share": 0.5, "non_ego_goal_share": 0.25})
-    ego, person = alone_bounds(asked, Arm(ego=NaiveEgo(), non_ego=ANNA))
-    assert (ego.goal_share, person.goal_share) == (0.5, 0.25)
-    assert (ego.words, person.words) == ("the naive ego", "the anna driver")
+    ego, beside_sumo, person = alone_bounds(asked, Arm(ego=NaiveEgo(), non_ego=ANNA))
+    assert (ego.goal_share, beside_sumo.goal_share, person.goal_share) == (0.5, 0.5, 0.25)
+    assert (ego.words, beside_sumo.words, person.words) == ("the naive ego", "the naive ego", "the anna driver")
+    assert (ego.where, beside_sumo.where) == ("alone", "beside an ordinary road user")
+
+
+def test_bounds__are_not_asked_beside_a_driver_beside_whom_the_ego_did_not_learn() -> None:
+    for changes in ({"naive_training": {"alone_share": 1.0}}, {"ego": {"driver": "egos/adas.toml"}}):
+        found = alone_bounds(campaign(**changes), Arm(ego=NaiveEgo(), non_ego=ANNA))
+        assert [each.arm for each in found] == ["naive_alone", "anna_alone"]
 
 
 @pytest.mark.parametrize(
@@ -84,7 +93,7 @@ def test_bounds__are_the_campaigns() -> None:
 )
 def test_questions__ask_the_players_of_both_arms(driver: str, tunable: bool, round_2: list[str] | None) -> None:
     asked = questions(campaign(ego={"driver": driver}), ["anna"], tunable)
-    rq1 = ["naive_alone", "anna_alone"]
+    rq1 = [*(NAIVE if driver == "learned" else ["naive_alone"]), "anna_alone"]
     expected = [rq1] if round_2 is None else [rq1, rq1 + round_2]
     assert [[each.arm for each in question.alone] for question in asked] == expected
 
@@ -105,12 +114,12 @@ def test_bounds__every_arm_that_they_name_is_played(changes: dict[str, Any], tun
 def test_trainings__are_judged_by_their_players_arm_alone_except_best_responses_and_answers() -> None:
     document = campaign(**RACE)
     trainings = [each for each in plan(document, ["anna", "bert"]) if isinstance(each, TrainingStage)]
-    bounds = {stage.name: bound_of(document, stage) for stage in trainings}
-    judged = {name: bound.arm for name, bound in bounds.items() if bound is not None}
-    assert judged["naive"] == "naive_alone"
-    assert judged["anna"] == "anna_alone"
-    assert judged["retrained_town"] == "retrained_alone_town"
-    assert judged["robust"] == "robust_alone"
+    bounds = {stage.name: bounds_of(document, stage) for stage in trainings}
+    judged = {name: [each.arm for each in found] for name, found in bounds.items() if found}
+    assert judged["naive"] == NAIVE
+    assert judged["anna"] == ["anna_alone"]
+    assert judged["retrained_town"] == ["retrained_alone_town"]
+    assert judged["robust"] == ["robust_alone"]
     unjudged = {each.name for each in trainings if isinstance(each.strategy, BestResponse | RoundAnswer)}
     assert "anna_round3_answer" in unjudged
     assert unjudged == set(bounds) - set(judged)

@@ -104,7 +104,7 @@ def test_questions__name_the_arms_and_who_has_to_drive() -> None:
         "naive_vs_cleo",
         "naive_vs_cleo_with_attention_of_anna",
     )
-    assert [bound.arm for bound in question.bounds] == ["naive_alone", "anna_alone", "cleo_alone"]
+    assert [bound.arm for bound in question.bounds] == ["naive_alone", "naive_vs_sumo", "anna_alone", "cleo_alone"]
 
 
 def test_keys__of_other_stages_do_not_depend_on_the_baseline(tmp_path: Path) -> None:

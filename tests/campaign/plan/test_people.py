@@ -48,7 +48,7 @@ def test_plan__questions_about_a_crowd_ask_each_of_its_personas_to_drive_alone()
         ("RQ1", "naive_alone", "naive_vs_mixed"),
         ("RQ2", "naive_vs_mixed", "retrained_vs_mixed"),
     ]
-    assert [each.arm for each in asked[0].alone] == ["naive_alone", "anna_alone", "bert_alone"]
+    assert [each.arm for each in asked[0].alone] == ["naive_alone", "naive_vs_sumo", "anna_alone", "bert_alone"]
 
 
 def test_keys__of_a_crowd_depend_on_who_is_in_which_place(scene: str, personas: list[str], tmp_path: Path) -> None:

@@ -43,6 +43,15 @@ def test_judged__a_player_that_cannot_drive_did_not_learn_whatever_stopped_its_t
     assert did_not_learn(found) == {"anna-seed1": "alone it reaches its goal in 79 of 100 games (79 %), below 80 %"}
 
 
+def test_judged__a_naive_ego_that_stands_beside_an_ordinary_driver_did_not_learn() -> None:
+    goals = {"naive_alone-seed1": Goals(goals=100, played=100), "naive_vs_sumo-seed1": Goals(goals=45, played=100)}
+    found = judge(goals)
+    assert found["naive-seed1"]["stopped"] == DID_NOT_LEARN
+    words = "beside an ordinary road user it reaches its goal in 45 of 100 games (45 %), below 97 %"
+    assert did_not_learn(found) == {"naive-seed1": words}
+    assert StageEntry.model_validate(found["naive-seed1"]).where == "beside an ordinary road user"
+
+
 def test_judged__an_ego_that_fails_on_a_further_road_did_not_learn() -> None:
     document = campaign_of("anna")
     before, goals = entries(document), {"naive_alone-seed1": Goals(goals=100, played=100)}
