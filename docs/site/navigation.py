@@ -72,6 +72,7 @@ SECTIONS = {
         "reproduction",
         "reproduction-assumptions",
         "realism",
+        "learning-curves",
         "performance",
         "step-cost",
     ),
