@@ -32,8 +32,9 @@ app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, help=__d
 def draw() -> None:
     """Draw the failure rate of every training over its steps: a row for each run, a column for each kind of player."""
     published = list(runs())
-    size = {"figsize": (9, 1.15 * len(published)), "sharex": True, "sharey": True, "constrained_layout": True}
-    figure, axes = plt.subplots(len(published), len(COLOURS), **size)
+    size = (9, 1.15 * len(published))
+    shape = (len(published), len(COLOURS))
+    figure, axes = plt.subplots(*shape, figsize=size, sharex=True, sharey=True, constrained_layout=True)
     for (name, curves, _), row in zip(published, axes, strict=True):
         for axis, (player, colour) in zip(row, COLOURS.items(), strict=True):
             _curves(axis, curves[curves["player"] == player], colour)
