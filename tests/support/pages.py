@@ -276,8 +276,9 @@ def recomputed(arguments: dict[str, Any], competence: Mapping[str, float] = UNGA
 
 
 def cannot_drive(arguments: dict[str, Any], seeds: Sequence[int] = (1,)) -> dict[str, Any]:
-    """The campaign with a speedy driver that never reaches its goal alone, in these seeds."""
+    """The campaign with a speedy driver that never reaches its goal alone, in these seeds. The naive ego can drive."""
     episodes = arguments["episodes"]
+    episodes.loc[episodes["arm"] == NAIVE_VS_SUMO.name, "ego_outcome"] = "goal"
     alone = (episodes["arm"] == "speedy_alone") & episodes["seed"].isin(seeds)
     episodes.loc[alone, "non_ego_outcome"] = "rail"
     for seed in seeds:
