@@ -174,7 +174,7 @@ def assert_interrupted(process: Process, code: int) -> None:
     printed = process.communicate(timeout=PATIENCE_S)[0]
     assert process.returncode == code, printed
     assert printed.splitlines()[-1] == CONTINUES
-    assert "Traceback" not in printed
+    assert "Traceback" not in printed, printed
     wait_until_nothing_is_left(process)
 
 
