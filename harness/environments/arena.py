@@ -24,7 +24,6 @@ from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.bicycle import Requested, along_rail, move, requests, slide
 from harness.game.human_factors import PlayersLimits
 from harness.game.initial_state import InitialState
-from harness.game.lapses import NOTICED_TTC_S, PlayersLapses, held_steering_rad
 from harness.game.observation_layout import SIZE
 from harness.game.outcome import Outcome
 from harness.game.quantities import Quantities
@@ -105,7 +104,6 @@ class Arena(LiveSimulation):
         drivers = [seat.driver for of_player in self.seats for seat in of_player if seat.driver is not None]
         self._has_drivers = any(driver.takes_over for driver in drivers)
         self._noise = np.zeros((games, players, self.world.steps if self._has_drivers else 0, 2))
-        self._lapses = PlayersLapses(games, players, self.world.steps)
         self._course_rad: FloatArray = np.zeros((games, players))  # of players that slide
         self._limits = PlayersLimits(games, players, self.world.steps)
         self._road_steering_rad: FloatArray = np.zeros((games, players))
@@ -183,8 +181,8 @@ class Arena(LiveSimulation):
         state.station_m, offset_m = world.road.routes.locate(state.x_m, state.y_m, before.station_m)
         quantities = self._quantities(state, before, offset_m)
         state.step = state.step + 1
-        if self._lapses.held.any():
-            self._end_glances(quantities)
+        if self._limits.lapses.held.any():
+            self._limits.end_glances(state, quantities.leader_ttc_s)
         if self._limits.misjudges:
             self._limits.look(state)
         distances_m = (quantities.goal_m, quantities.vehicle_clearance_m, quantities.rail_clearance_m)
@@ -219,20 +217,9 @@ class Arena(LiveSimulation):
         acceleration, steering = requests(chosen, state.speed_mps, self._road_steering_rad, self.world.actuators)
         if self._limits.spares:
             acceleration, steering = self._limits.within(acceleration, steering)
-        held = (state.acceleration_mps2, self._road_steering_rad)
-        if self._lapses.held.any():
-            routes = self.world.road.routes
-            road = (self._road_steering_rad, routes.heading_rad[routes.rows(state.station_m)])
-            held = (state.acceleration_mps2, held_steering_rad(state, road, self.world.actuators.wheelbase_m))
-        state.lapsed = self._lapses.omit_actions((acceleration, steering), held, now, drove)
+        road, wheelbase_m = (self._road_steering_rad, self.world.road.routes), self.world.actuators.wheelbase_m
+        state.lapsed = self._limits.lapses.omit_actions((acceleration, steering), state, road, wheelbase_m, drove)
         return acceleration, steering
-
-    def _end_glances(self, quantities: Quantities) -> None:
-        """End the glances of players that notice by peripheral sight that they close in on the vehicle ahead."""
-        noticed = self.state.lapsed & self._lapses.held & (quantities.leader_ttc_s <= NOTICED_TTC_S)
-        for game, player in np.argwhere(noticed).tolist():
-            lapsed = self._lapses.end(game, player, self.state.step[game])
-            self._limits.set_lapsed(game, player, lapsed)
 
     def _payoffs(self, quantities: Quantities, drove: BoolArray) -> FloatArray:
         payoff = np.zeros(drove.shape)
@@ -321,7 +308,6 @@ class Arena(LiveSimulation):
         state.outcome[game], state.lapsed[game], state.step[game] = _RUNNING, False, 0
         self.nearby.place(game, start)
         for player in range(len(self.seats)):
-            self._lapses.reset(game, player, start.lapses[player])
             self._limits.reset(game, player, start.limits[player], start.lapses[player], state)
         if self._has_drivers:
             self._noise[game] = start.noise

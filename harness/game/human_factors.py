@@ -22,7 +22,7 @@ import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.jit import compiled
-from harness.game.lapses import Attention, Lapses, lags
+from harness.game.lapses import NOTICED_TTC_S, Attention, Lapses, PlayersLapses, lags
 from harness.game.state import State, sight_cosine
 
 PERSISTENCE_S = 20.0  # correlation time of estimation errors (Treiber, Kesting and Helbing 2006, table 1)
@@ -134,6 +134,7 @@ class PlayersLimits:
     """The limits of the players of G games that are played together."""
 
     def __init__(self, games: int, players: int, steps: int) -> None:
+        self.lapses = PlayersLapses(games, players, steps)
         self._delay_steps: IntArray = np.zeros((games, players), dtype=np.int64)
         self._lags: IntArray = np.zeros((games, players, steps), dtype=np.int64)
         self._estimation_errors = np.zeros((games, players, steps, 2))
@@ -142,9 +143,10 @@ class PlayersLimits:
         """Whether any player so far had a reaction time, estimation errors, or actuator shares below 1."""
 
     def reset(self, game: int, player: int, limits: Limits, lapses: Lapses, state: State) -> None:
-        """Set a player's limits for a game that starts, and its sight in the state."""
+        """Set a player's limits and lapses for a game that starts, and its sight in the state."""
         self._delay_steps[game, player] = limits.delay_steps
-        self.set_lapsed(game, player, lapses.lapsed)
+        self.lapses.reset(game, player, lapses)
+        self._know(game, player, lapses.lapsed)
         self._actuator_shares[game, player] = limits.actuator_shares
         errors = limits.estimation_errors
         self._estimation_errors[game, player] = 0.0 if errors is None else errors
@@ -156,7 +158,14 @@ class PlayersLimits:
         self.misjudges |= errors is not None
         self.spares |= limits.actuator_shares != NO_LIMITS.actuator_shares
 
-    def set_lapsed(self, game: int, player: int, lapsed: BoolArray) -> None:
+    def end_glances(self, state: State, leader_ttc_s: FloatArray) -> None:
+        """End the glances of players that notice by peripheral sight that they close in on the vehicle ahead, from the
+        next step on. `leader_ttc_s` are their times to collision with it [G, P]."""
+        noticed = state.lapsed & self.lapses.held & (leader_ttc_s <= NOTICED_TTC_S)
+        for game, player in np.argwhere(noticed).tolist():
+            self._know(game, player, self.lapses.end(game, player, int(state.step[game])))
+
+    def _know(self, game: int, player: int, lapsed: BoolArray) -> None:
         """Set the steps [T] of a player's game with a lapse, in which it does not see what others do."""
         delay_steps = int(self._delay_steps[game, player])
         self._lags[game, player] = lags(lapsed, delay_steps) if delay_steps else 0

@@ -18,6 +18,7 @@ import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.jit import compiled
+from harness.game.road import Routes
 from harness.game.seeding import between
 from harness.game.state import State
 
@@ -130,13 +131,21 @@ class PlayersLapses:
     def omit_actions(
         self,
         requested: tuple[FloatArray, FloatArray],
-        held: tuple[FloatArray, FloatArray],
-        now: IntArray,
+        state: State,
+        road: tuple[FloatArray, Routes],
+        wheelbase_m: FloatArray,
         drove: BoolArray,
     ) -> BoolArray:
-        """Change the requested accelerations and steering angles [G, P] of players that have a lapse in the steps `now`
-        [G], as of `release_controls`. Returns these players [G, P]."""
-        return release_controls(requested, held, (self._lapsed, self.held, self._steering_rad), now, drove)
+        """Change the requested accelerations and steering angles [G, P] of players that have a lapse in this step, as
+        of `release_controls`. `road` are the steering angles that follow the road [G, P] and the routes, wheelbases are
+        [P]. Returns these players [G, P]."""
+        steering_rad, routes = road
+        if self.held.any():
+            heading_rad = routes.heading_rad[routes.rows(state.station_m)]
+            steering_rad = held_steering_rad(state, (steering_rad, heading_rad), wheelbase_m)
+        lapses = (self._lapsed, self.held, self._steering_rad)
+        now = np.minimum(state.step, self._lapsed.shape[-1] - 1)
+        return release_controls(requested, (state.acceleration_mps2, steering_rad), lapses, now, drove)
 
     def end(self, game: int, player: int, step: int) -> BoolArray:
         """End the lapse that a player has in a step, if any, before this step. Returns its steps with a lapse [T]."""

@@ -24,7 +24,7 @@ from harness.game.human_factors import (
     glances_over_shoulder,
 )
 from harness.game.initial_state import InitialState, draw_initial_state
-from harness.game.lapses import Attention, Lapses, PlayersLapses, draw_lapses, held_steering_rad, lags
+from harness.game.lapses import NOTICED_TTC_S, Attention, Lapses, draw_lapses, held_steering_rad, lags
 from harness.game.observation_layout import LAYOUT, in_units
 from harness.game.state import State
 from harness.game.world import World
@@ -331,11 +331,11 @@ def test_glance__ends_where_the_car_closes_in_on_the_one_ahead(
 
 def test_glance__that_ends_is_followed_by_the_reaction_time() -> None:
     """A glance from step 2 on ends in step 4: two steps later the player knows what it then saw."""
-    lapses, limits = PlayersLapses(1, 1, 8), PlayersLimits(1, 1, 8)
+    limits, state = PlayersLimits(1, 1, 8), State.empty(1, 1)
     glance = Lapses(np.arange(8) >= 2, np.zeros(8), held=True)
-    lapses.reset(0, 0, glance)
-    limits.reset(0, 0, Limits(delay_steps=2), glance, State.empty(1, 1))
-    limits.set_lapsed(0, 0, lapses.end(0, 0, 4))
+    limits.reset(0, 0, Limits(delay_steps=2), glance, state)
+    state.lapsed[:], state.step[:] = True, 4
+    limits.end_glances(state, np.array([[NOTICED_TTC_S]]))
     assert [int(limits.lags(np.array([step]))[0, 0]) for step in range(8)] == [0, 1, 2, 2, 3, 4, 2, 2]
 
 
