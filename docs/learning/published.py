@@ -9,14 +9,19 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import matplotlib.pyplot as plt
 import pandas as pd
 import typer
 from matplotlib.axes import Axes
 
+from harness.campaign.plan.stages import TrainingStage, stage_id
+from harness.campaign.storage.manifest import planned
 from harness.evaluation.competence import DID_NOT_LEARN
+from harness.evaluation.strategies import NaiveEgo, Strategy, player_of
 from harness.evaluation.tables import read_csv
+from harness.game.roles import EGO
 
 ROOT = Path(__file__).parents[2]
 FIGURE = ROOT / "docs" / "learning" / "published.png"
@@ -58,30 +63,30 @@ def table() -> None:
         print(f"| `{name}` | " + " | ".join(map(str, counts)) + f" | {', '.join(failed) or 'none'} |")
 
 
-def runs() -> Iterator[tuple[str, pd.DataFrame, dict[str, dict[str, object]]]]:
-    """Each published run with trainings of its own: its name, its learning curves with the kind of player, and the
-    entries of its trainings in the manifest."""
+def runs() -> Iterator[tuple[str, pd.DataFrame, dict[str, dict[str, Any]]]]:
+    """Each published run with trainings of its own: its name, its learning curves with the kind of player and the share
+    of the budget, and the entries of its trainings in the manifest."""
     for file in sorted(ROOT.glob("reports/*/training.csv*")):
-        stages = json.loads((file.parent / "manifest.json").read_text(encoding="utf-8"))["stages"]
-        trainings = {name: entry for name, entry in stages.items() if entry["kind"] == "training"}
-        own = {name: entry for name, entry in trainings.items() if entry.get("steps") is not None}
+        manifest = json.loads((file.parent / "manifest.json").read_text(encoding="utf-8"))
+        players = {each.id: _player(each.strategy) for each in planned(manifest) if isinstance(each, TrainingStage)}
+        own = {name: manifest["stages"][name] for name in players if manifest["stages"][name].get("steps") is not None}
         if own:
             curves = read_csv(file.with_name("training.csv"))
-            yield file.parent.name, curves.assign(player=curves["stage"].map(_player)), own
+            training = pd.Series(map(stage_id, curves["stage"], curves["seed"]), index=curves.index)
+            budget = training.map({name: entry["budget_steps"] for name, entry in own.items()})
+            share = curves["steps"] / budget
+            yield file.parent.name, curves.assign(training=training, player=training.map(players), share=share), own
 
 
-def _player(stage: str) -> str:
-    """The kind of player of a training. A best response is one of the player that its name says."""
-    if stage == "naive":
+def _player(strategy: Strategy) -> str:
+    if isinstance(strategy, NaiveEgo):
         return NAIVE
-    of_ego = stage.startswith(("retrained", "robust")) and "non_ego_response" not in stage
-    return LATER if of_ego else PEOPLE
+    return LATER if player_of(strategy) == EGO else PEOPLE
 
 
 def _curves(axis: Axes, curves: pd.DataFrame, colour: str) -> None:
-    """Draw the curves of some trainings, each over the share of the longest one of its stage."""
-    longest = curves.groupby("stage")["steps"].transform("max")
-    for _, one in curves.assign(share=curves["steps"] / longest).groupby(["stage", "seed"], sort=False):
+    """Draw the curves of some trainings."""
+    for _, one in curves.groupby("training", sort=False):
         axis.plot(one["share"], one["failure_rate"].rolling(WINDOWS, min_periods=1).mean(), color=colour, linewidth=0.8)
     axis.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
     axis.tick_params(labelsize=7)
