@@ -56,8 +56,10 @@ def test_trace__is_the_recording_of_one_game() -> None:
 
 
 def test_trace__a_published_run_without_traces_is_refused() -> None:
+    results = harness.load(REPOSITORY / "reports" / "merge")
+    seed = int(results.episodes["seed"].iloc[0])
     with pytest.raises(harness.UsageError, match="this folder does not contain the traces"):
-        harness.load(REPOSITORY / "reports" / "merge").trace("naive_vs_speedy", 21, 23)
+        results.trace("naive_vs_speedy", seed, 23)
 
 
 def test_policies__are_shown_by_their_names_and_shapes(tmp_path: Path) -> None:

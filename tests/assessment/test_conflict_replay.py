@@ -146,6 +146,32 @@ def test_chances__last_moment_is_that_of_the_braking_distance(straight: OpenScen
     assert gap_m == pytest.approx(10.5, abs=closing * STEP_S)
 
 
+def test_chances__are_the_same_when_a_person_has_reached_its_goal_before_the_collision(straight: OpenScene) -> None:
+    """The ego hits a bystander. A person reaches its goal a second after the start, and is gone in the next step."""
+    alone = cut_in(straight, gap_m=20.0, own_kmh=60, other_kmh=20, approach_mps=1.2)
+    steps, leaves, speed_mps = len(alone.players), 10, 20.0
+    there = np.arange(steps) <= leaves
+    players, present = alone.players.copy(), alone.players_present.copy()
+    x_m = 850.5 + speed_mps * STEP_S * (np.arange(steps) - leaves)
+    players[:, 1] = np.stack(poses(x_m, np.full(steps, -1.5 * LANE_M), speed_mps), axis=1) * there[:, None]
+    present[:, 1] = there
+    hit = replace(
+        alone,
+        players=players,
+        players_present=present,
+        station_m=players[:, :, 0],
+        others=alone.players[:, 1:],
+        others_present=alone.players_present[:, 1:],
+        others_size_m=np.array([[LENGTH_M, WIDTH_M]]),
+        opponent=2,
+    )
+    expected, found = (
+        ConflictReplay(straight, [Collision(episode=0, course=course)], seed=1).chances() for course in (alone, hit)
+    )
+    assert expected[0].first_step == 0
+    assert found == expected
+
+
 def test_collision_of__knows_the_opponent_of_a_recorded_game(merge: OpenScene) -> None:
     """Both keep their pedals still on the merge: the lanes end in each other, and some of the games collide."""
     games = play(arm(merge, Steady(), Steady()), 6)
