@@ -243,7 +243,7 @@ def start_of(replay: CourseReplay, drawn: InitialState) -> InitialState:
     step."""
     course, step = replay.course, replay.first_step
     x_m, y_m, heading_rad, speed_mps = course.players[step].T.copy()
-    present = course.players_present[step : step + 2].all(axis=0)
+    present = course.players_present[step] & course.players_present[step + 1]
     if replay.only_opponent:
         present &= np.isin(np.arange(len(present)), (EGO, course.opponent))
     return replace(
