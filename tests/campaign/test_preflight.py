@@ -145,8 +145,8 @@ def test_open_campaign__roads_on_which_no_ego_can_learn_are_refused(
 
 
 def test_open_campaign__shipped_people_are_those_of_the_scene_and_of_its_roads(tmp_path: Path) -> None:
-    shutil.copytree(PAPER_MERGE, tmp_path / "deserted")
-    asked = {"scene": "deserted", "retraining": {"against": ["sumo", "shipped"]}, "personas": []}
+    shutil.copytree(PAPER_MERGE, tmp_path / "copy")
+    asked = {"scene": "copy", "retraining": {"against": ["sumo", "shipped"]}, "personas": []}
     (problem,) = problems_of(write_campaign(tmp_path, **asked))
     assert problem.key == "retraining.against"
     assert "no people are shipped" in problem.message

@@ -45,8 +45,8 @@ def test_campaign__its_egos_learn_on_other_roads_and_its_people_do_not() -> None
 def test_campaign__its_robust_ego_meets_the_shipped_people_of_each_road(tmp_path: Path) -> None:
     """A road without shipped people, as a copy of a scene, has SUMO's driver alone."""
     against = {"retraining": {"against": ["sumo", "shipped"]}, "personas": []}
-    shutil.copytree(MERGE.parent / "brake", deserted := tmp_path / "deserted")
-    run = finished(name="shipped", roads=[str(MERGE), str(deserted)], assessment={"episodes": 2}, **against)
+    shutil.copytree(MERGE.parent / "brake", copy := tmp_path / "copy")
+    run = finished(name="shipped", roads=[str(MERGE), str(copy)], assessment={"episodes": 2}, **against)
     card = json.loads((run / "policies" / "robust-seed1" / "policy.json").read_text())
     assert card["roads"] == ["merge", "brake"]
     assert card["against"] == "one in each game of sumo, the shipped people of the scene"

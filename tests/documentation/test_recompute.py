@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from pathlib import Path
 
 import pandas as pd
 import pytest
 
+from harness.evaluation.tables import read_csv
 from tests.support.repository import REPOSITORY
 from tests.support.scripts import script
 
@@ -48,3 +50,14 @@ def test_runs__default_to_all_published_ones_and_must_have_games(capsys: pytest.
         recompute.runs_named([str(REPORTS / "nothing")])
     assert ended.value.code == 2
     assert "has no summary.csv, or no episodes.csv" in capsys.readouterr().err
+
+
+def test_reports__the_list_of_published_runs_has_their_games() -> None:
+    listed = re.findall(r"^\| \[[\w-]+\]\(([\w-]+)\) \| ([\d,]+) \|", (REPORTS / "README.md").read_text("utf-8"), re.M)
+    games = {run: int(count.replace(",", "")) for run, count in listed}
+    played = {
+        run: len(read_csv(REPORTS / run / "episodes.csv")) for run in games if (REPORTS / run / "summary.csv").exists()
+    }
+    played["league"] = sum(read_csv(file)["episodes"].sum() for file in REPORTS.glob("league/*/league.csv"))
+    assert len(played) > 20
+    assert {run: games[run] for run in played} == played
