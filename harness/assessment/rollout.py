@@ -15,12 +15,12 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeAlias
 
 import pandas as pd
 
 from harness.assessment.game_traces import GameTraces
-from harness.assessment.seated_arm import SeatedArm
+from harness.assessment.seated_arm import SeatedArm, joined
 from harness.drivers.mixture import factors_of, shares_of
 from harness.drivers.side_by_side import side_by_side
 from harness.environments.arena import Arena
@@ -29,7 +29,7 @@ from harness.environments.seats import seats_of
 from harness.errors import is_of_disk
 from harness.evaluation.measured_game import measured
 from harness.evaluation.recorded_game import RecordedGame
-from harness.game.initial_state import InitialState, draw_initial_state
+from harness.game.initial_state import InitialState, StartDistribution, draw_initial_state
 from harness.game.outcome import Outcome
 from harness.game.seeding import generator_of, parts_of
 from harness.road.demand.route_file import Departure
@@ -90,29 +90,48 @@ def assess_batches(
     has the reason as its error. `start_from` may change the start that is drawn for an episode.
     Raises SimulationError if SUMO can't load the scene, MemoryError, and OSError if the disk takes no more.
     """
-    with _Rollout(arm, on_start, start_from) as rollout:
+    for games in assess_arms([arm], batches, on_start, abandoned, start_from):
+        yield from games
+
+
+def assess_arms(
+    arms: Sequence[SeatedArm],
+    batches: Iterable[Sequence[int]],
+    on_start: Callable[[int], None] = lambda episode: None,
+    abandoned: Mapping[int, str] = MappingProxyType({}),
+    start_from: Callable[[int, InitialState], InitialState] = lambda episode, drawn: drawn,
+) -> Generator[list[Game], None, None]:
+    """Play batches of episodes as `assess_batches` does, each episode with every one of several arms, all side by side:
+    the games of an episode, one of each arm. The arms are such as `seated_arm.joined` takes."""
+    with _Rollout(arms, on_start, start_from) as rollout:
         for batch in batches:
-            together = rollout.play_together([each for each in batch if each not in abandoned])
+            played = [(arm, episode) for episode in batch if episode not in abandoned for arm in range(len(arms))]
+            together = rollout.play_together(played)
             for episode in batch:
                 if episode in abandoned:
-                    yield _failed(arm, episode, abandoned[episode])
+                    yield [_failed(arm, episode, abandoned[episode]) for arm in arms]
                 else:
-                    yield together.pop(episode) if episode in together else rollout.play_alone(episode)
+                    places = [(arm, episode) for arm in range(len(arms))]
+                    yield [together.pop(each) if each in together else rollout.play_alone(*each) for each in places]
+
+
+_Place: TypeAlias = tuple[int, int]
+"""The place of a game: that of its arm among the arms, and its episode."""
 
 
 class _Rollout:
-    """Plays games of an arm. SUMO runs in the `with` block."""
+    """Plays games of arms. SUMO runs in the `with` block."""
 
     def __init__(
         self,
-        arm: SeatedArm,
+        arms: Sequence[SeatedArm],
         on_start: Callable[[int], None],
         start_from: Callable[[int, InitialState], InitialState],
     ) -> None:
-        self._arm, self._on_start, self._start_from = arm, on_start, start_from
-        factors, shares = [factors_of(each) for each in arm.drivers], [shares_of(each) for each in arm.drivers]
-        self._starts = arm.scene.start_distribution(factors, [1.0] * len(factors), shares)
-        self._together = _for_games_together(arm)
+        self._arms, self._on_start, self._start_from = arms, on_start, start_from
+        self._joined, self._first_members = joined(arms)
+        self._starts = [_start_distribution(each) for each in arms]
+        self._together = _for_games_together(self._joined)
         self._alone: Arena | None = None
 
     def __enter__(self) -> _Rollout:
@@ -122,84 +141,91 @@ class _Rollout:
     def __exit__(self, *error: object) -> None:
         self._close_alone()
 
-    def play_alone(self, episode: int) -> Game:
+    def play_alone(self, arm: int, episode: int) -> Game:
         """Play a game in a simulation of its own."""
         self._on_start(episode)
         try:
-            arena, start = self._open_alone(), self._start(episode)
+            arena, start = self._open_alone(), self._start(arm, episode)
             arena.reload(start.seed)
-            (game,) = self._play(self._arm, arena, {episode: start}).values()
+            (game,) = self._play(self._joined, arena, {(arm, episode): start}).values()
         except Exception as error:  # a driver may raise any exception: the other games are played
             if isinstance(error, MemoryError) or is_of_disk(error):
                 raise
-            return _failed(self._arm, episode, f"{type(error).__name__}: {error}")
+            return _failed(self._arms[arm], episode, f"{type(error).__name__}: {error}")
         return game
 
-    def play_together(self, episodes: Sequence[int]) -> dict[int, Game]:
+    def play_together(self, places: Sequence[_Place]) -> dict[_Place, Game]:
         """Play those of the games that can be played side by side. Empty if one of them ends with an error."""
-        arm = self._together
-        if arm is None or len(episodes) < 2:
+        if self._together is None or len(places) < 2:
             return {}
-        starts = {episode: self._start(episode) for episode in episodes}
+        starts = {place: self._start(*place) for place in places}
         self._close_alone()
-        for episode in starts:
+        for _, episode in places:
             self._on_start(episode)
         try:
-            with closing(_arena(arm, _tiles(len(starts)))) as arena:
-                return self._play(arm, arena, starts)
+            with closing(_arena(self._together, _tiles(len(starts)))) as arena:
+                return self._play(self._together, arena, starts)
         except Exception as error:
             if isinstance(error, MemoryError) or is_of_disk(error):
                 raise
             return {}
 
-    def _play(self, arm: SeatedArm, arena: Arena, starts: Mapping[int, InitialState]) -> dict[int, Game]:
-        """Play games from their starts, as many at a time as the arena has tiles, with the drivers of `arm`."""
-        traces, waiting = GameTraces(arm, arena), deque(starts)
-        free, episode_of, played = list(range(arena.games)), dict[int, int](), dict[int, Game]()
-        while waiting or episode_of:
+    def _play(self, seated: SeatedArm, arena: Arena, starts: Mapping[_Place, InitialState]) -> dict[_Place, Game]:
+        """Play games from their starts, as many at a time as the arena has tiles, with the drivers `seated` in it."""
+        traces, waiting = GameTraces(seated, arena), deque(starts)
+        free, place_of, played = list(range(arena.games)), dict[int, _Place](), dict[_Place, Game]()
+        while waiting or place_of:
             begun = [free.pop() for _ in range(min(len(free), len(waiting)))]
             if begun:
-                episode_of |= {tile: waiting.popleft() for tile in begun}
-                departures = {tile: self._departures(episode_of[tile]) for tile in begun}
-                arena.reset({tile: starts[episode_of[tile]] for tile in begun}, departures)
+                place_of |= {tile: waiting.popleft() for tile in begun}
+                departures = {tile: self._departures(place_of[tile][1]) for tile in begun}
+                arena.reset({tile: starts[place_of[tile]] for tile in begun}, departures)
                 traces.begin(begun)
             present = arena.state.present
             if arena.state.running.any():
                 traces.add(present, arena.step())
             runs = arena.state.running
-            for tile in [each for each in episode_of if not runs[each].any()]:
-                episode = episode_of.pop(tile)
+            for tile in [each for each in place_of if not runs[each].any()]:
+                place = place_of.pop(tile)
+                arm, episode = self._arms[place[0]], place[1]
                 outcomes = [Outcome(outcome) for outcome in arena.state.outcome[tile].tolist()]
-                cells = _played(self._arm, episode, outcomes, "") | self._weather(starts[episode])
+                cells = _played(arm, episode, outcomes, "") | _weather(arm.scene, starts[place])
                 trace = traces.end(tile, episode)
-                played[episode] = Game(played=cells, trace=trace, scene=self._arm.scene)
+                played[place] = Game(played=cells, trace=trace, scene=arm.scene)
                 free.append(tile)
         return played
 
-    def _start(self, episode: int) -> InitialState:
-        present = [float(each) for each in self._arm.present_in(episode)]
-        parts = parts_of(self._arm.seed, episode)
-        return self._start_from(episode, draw_initial_state(replace(self._starts, present_share=present), *parts))
-
-    def _weather(self, start: InitialState) -> dict[str, float]:
-        """What the scene varies of it, in one game."""
-        varies = self._arm.scene.document.varies
-        return {
-            name: getattr(start, name) for name in ("friction", "visibility_m") if getattr(varies, name) is not None
-        }
+    def _start(self, arm: int, episode: int) -> InitialState:
+        seated, first = self._arms[arm], self._first_members[arm]
+        present = [float(each) for each in seated.present_in(episode)]
+        parts = parts_of(seated.seed, episode)
+        drawn = draw_initial_state(replace(self._starts[arm], present_share=present), *parts)
+        start = self._start_from(episode, drawn)
+        return replace(start, member=tuple(map(sum, zip(first, start.member, strict=True))))
 
     def _departures(self, episode: int) -> list[Departure]:
-        return self._arm.scene.departures(generator_of(*parts_of(self._arm.seed, episode), "others"))
+        return self._joined.scene.departures(generator_of(*parts_of(self._joined.seed, episode), "others"))
 
     def _open_alone(self) -> Arena:
         if self._alone is None:
-            self._alone = _arena(self._arm, 1)
+            self._alone = _arena(self._joined, 1)
         return self._alone
 
     def _close_alone(self) -> None:
         if self._alone is not None:
             self._alone.close()
         self._alone = None
+
+
+def _start_distribution(arm: SeatedArm) -> StartDistribution:
+    factors, shares = [factors_of(each) for each in arm.drivers], [shares_of(each) for each in arm.drivers]
+    return arm.scene.start_distribution(factors, [1.0] * len(factors), shares)
+
+
+def _weather(scene: OpenScene, start: InitialState) -> dict[str, float]:
+    """What a scene varies of it, in one game."""
+    varies = scene.document.varies
+    return {name: getattr(start, name) for name in ("friction", "visibility_m") if getattr(varies, name) is not None}
 
 
 def _arena(arm: SeatedArm, games: int) -> Arena:

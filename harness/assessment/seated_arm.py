@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import pyarrow as pa
 
@@ -51,3 +52,34 @@ class SeatedArm:
             return present
         people = [player for player, there in enumerate(present) if there]
         return [player == people[episode % len(people)] for player in range(len(present))]
+
+
+def joined(arms: Sequence[SeatedArm]) -> tuple[SeatedArm, list[list[int]]]:
+    """Arms of one scene and one seed as one arm, in which each player has the drivers of all of them; and for each arm
+    and player the place of its first driver [arms, P]. What is the same mixture in all arms stays one.
+
+    Raises ValueError where a player takes part in some arms only, where SUMO drives it in some only, and for a shield
+    in one of several arms.
+    """
+    if len(arms) == 1:
+        return arms[0], [[0] * len(arms[0].drivers)]
+    if any(any(each.shields) for each in arms):
+        raise ValueError("a player with a shield has one driver")
+    drivers, firsts = list[Mixture | None](), list[list[int]]()
+    for of_player in zip(*(each.drivers for each in arms), strict=True):
+        mixture, first = _joined_mixture(of_player)
+        drivers.append(mixture)
+        firsts.append(first)
+    return replace(arms[0], drivers=tuple(drivers)), [list(each) for each in zip(*firsts, strict=True)]
+
+
+def _joined_mixture(of_arms: Sequence[Mixture | None]) -> tuple[Mixture | None, list[int]]:
+    if all(each is of_arms[0] for each in of_arms):
+        return of_arms[0], [0] * len(of_arms)
+    taking_part = [each for each in of_arms if each is not None]
+    if len(taking_part) < len(of_arms):
+        raise ValueError("a player takes part in all arms or in none")
+    sizes = [len(each.members) for each in taking_part]
+    return Mixture(tuple(member for each in taking_part for member in each.members)), [
+        sum(sizes[:place]) for place in range(len(sizes))
+    ]

@@ -10,14 +10,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from harness.assessment.rollout import assess_batches, plays_side_by_side
+from harness.assessment.rollout import assess_arms, assess_batches, plays_side_by_side
 from harness.assessment.seated_arm import SeatedArm
 from harness.config.ego_perception import EgoPerception
+from harness.config.persona import Persona
 from harness.config.scene import Varies
 from harness.config.toml_reading import read_document
 from harness.drivers.car import car_of
+from harness.drivers.mixture import mixture_of
 from harness.drivers.policy_file import LearnedDriver
-from harness.drivers.reference_drivers import UPPER_BOUND, reference_driver
+from harness.drivers.reference_drivers import REFERENCES, UPPER_BOUND, reference_driver
 from harness.drivers.shield import ShieldedDriver
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Step
@@ -30,7 +32,7 @@ from harness.game.arrays import FloatArray, IntArray
 from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.repository import REPOSITORY
 from tests.support.rollouts import RANDOM, Steady, arm, play, records, trace
-from tests.support.tiny import TEXTING
+from tests.support.tiny import CAREFUL, TEXTING
 
 FOGGY = REPOSITORY / "tests" / "data" / "perception" / "foggy.toml"
 MEASURED = [name for name, column in TABLES["episodes"].items() if column.dtype == NUMBER]
@@ -158,6 +160,29 @@ def test_batch__of_more_games_than_tiles(scene: str, monkeypatch: pytest.MonkeyP
     alone = side_by_side(assessed, *([episode] for episode in range(7)))
     monkeypatch.setattr("harness.assessment.rollout.SIDE_BY_SIDE", 2)
     assert side_by_side(assessed, [*range(7)]) == alone
+
+
+def test_arms__side_by_side_have_the_bytes_of_each_arm_alone(merge: OpenScene) -> None:
+    """The arms have different drivers of the ego, with a reaction time and without, and share those of the person."""
+    first = arm(merge, RANDOM, RANDOM, persona=TEXTING)
+    judges = [reference_driver(each, car_of(merge.world, 0), 3.5) for each in REFERENCES]
+    egos = [mixture_of(judge, read_document(CAREFUL, Persona)) for judge in judges]
+    arms = [first, *(replace(first, drivers=(ego, first.drivers[1])) for ego in egos)]
+    alone = [side_by_side(each, *([episode] for episode in range(5))) for each in arms]
+    assert len({*map(tuple, alone)}) == len(arms)
+    for batches in ([[0, 1, 2, 3, 4]], [[0], [1, 2], [3, 4]]):
+        played = [[repr((game.played, game.trace)) for game in games] for games in assess_arms(arms, batches)]
+        assert [list(each) for each in zip(*played, strict=True)] == alone
+
+
+def test_arms__that_can_not_share_a_simulation_are_refused(merge: OpenScene) -> None:
+    first = arm(merge, RANDOM, RANDOM)
+    for other in (arm(merge, RANDOM, None), arm(merge, SumoDriver(), RANDOM)):
+        with pytest.raises(ValueError, match=r"takes part|SUMO"):
+            list(assess_arms([first, other], [[0]]))
+    shielded = arm(merge, ShieldedDriver(RANDOM, merge.world), RANDOM)
+    with pytest.raises(ValueError, match="shield"):
+        list(assess_arms([first, shielded], [[0]]))
 
 
 def test_batch__drivers_of_others_and_sumo_play_alone(merge: OpenScene) -> None:

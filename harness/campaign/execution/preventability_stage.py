@@ -1,11 +1,11 @@
 """Judging an arm's failures: which of them the reference drivers prevent.
 
-<work>/segments/<driver>.json      the games that one reference driver has played, with the versions that played them
+<work>/segments/<episode>.json     games from this one on, as all reference drivers have played them, with the versions
 <work>/reference_drivers.csv       a row for each failure and reference driver
 <work>/takeovers.csv               the courses in collisions that a driver prevents from the conflict on
 
-So the judgement continues with the next reference driver after an interruption. What a driver does in a game depends on
-nothing but itself: the table is the same bytes with and without interruptions.
+So the judgement continues with the next games after an interruption. What a driver does in a game depends on nothing
+but itself: the table is the same bytes with and without interruptions.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 
 from harness.assessment.conflict_replay import Collision, ConflictReplay, Takeover, collision_of
 from harness.assessment.continuation import Continuation
-from harness.assessment.rollout import assess_batches
+from harness.assessment.rollout import assess_arms
 from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import StageRun
 from harness.campaign.plan.planned_drivers import SumoDriven
@@ -30,7 +30,7 @@ from harness.campaign.storage.run_folder import JUDGED, TAKEN_OVER
 from harness.campaign.storage.versions import versions_of_numbers
 from harness.drivers.car import car_of
 from harness.drivers.mixture import mixture_of
-from harness.drivers.reference_drivers import REFERENCES, lane_width_of, reference_driver
+from harness.drivers.reference_drivers import REFERENCES, UPPER_BOUND, lane_width_of, reference_driver
 from harness.evaluation.competence import broken_by
 from harness.evaluation.tables import table_of, write_csv
 from harness.evaluation.trace_file import TraceReader
@@ -39,6 +39,7 @@ from harness.game.roles import EGO, NON_EGO
 from harness.road.scene.open_scene import OpenScene
 
 _COLLISIONS_AT_ONCE = 50  # what the ego sees in each of their steps is kept in memory
+_GAMES_AT_ONCE = 50  # they are stored together
 
 
 def carry_out_preventability(
@@ -59,7 +60,7 @@ def carry_out_preventability(
     for failure in failures.itertuples():
         episode = int(failure.episode)
         for name in REFERENCES:
-            outcome, error = starts[name][episode]["outcome"], starts[name][episode]["error"]
+            outcome, error = starts[episode][name]["outcome"], starts[episode][name]["error"]
             row = {
                 "arm": failure.arm,
                 "persona": failure.persona,
@@ -141,26 +142,30 @@ def _takeover_rows(
 
 def _from_start(
     stage: PreventabilityStage, run: StageRun, scene: OpenScene, episodes: Sequence[int]
-) -> dict[str, dict[int, dict[str, str]]]:
+) -> dict[int, dict[str, dict[str, str]]]:
     """How each episode ends with each reference driver in the ego's seat: its outcome and its error."""
     folder = run.context.folder.segments(stage.id)
     make_folder(folder)
     seatless = PlayerFactory(context=run.context, scene=scene).arm(replace(stage.of, ego=(SumoDriven(),)))
-    found: dict[str, dict[int, dict[str, str]]] = {}
-    for name in REFERENCES:
-        outcomes = _stored(folder / f"{name}.json", run.attempt.first)
+    car, lane_width_m = car_of(scene.world, EGO), lane_width_of(scene.world)
+    egos = [mixture_of(reference_driver(name, car, lane_width_m), run.context.ego_persona) for name in REFERENCES]
+    arms = [replace(seatless, drivers=(ego, *seatless.drivers[1:])) for ego in egos]
+    found: dict[int, dict[str, dict[str, str]]] = {}
+    for first in range(0, len(episodes), _GAMES_AT_ONCE):
+        part = episodes[first : first + _GAMES_AT_ONCE]
+        file = folder / f"{part[0]:06d}.json"
+        outcomes = _stored(file, run.attempt.first)
         if outcomes is None:
             outcomes = {}
-            driver = reference_driver(name, car_of(scene.world, EGO), lane_width_of(scene.world))
-            drivers = (mixture_of(driver, run.context.ego_persona), *seatless.drivers[1:])
-            batches, judged = run.attempt.batches(episodes), replace(seatless, drivers=drivers)
-            for game in assess_batches(judged, batches, run.on_start, run.attempt.abandoned):
-                record = game.record
-                outcomes[record["episode"]] = {"outcome": outcome_of(record), "error": str(record["error"])}
-                run.on_progress(len(found) * len(episodes) + len(outcomes), len(episodes) * len(REFERENCES))
-            facts = {"versions": versions_of_numbers(), "outcomes": outcomes}
-            write_checksums(folder / f"{name}.json", folder, [], facts)
-        found[name] = outcomes
+            for games in assess_arms(arms, run.attempt.batches(part), run.on_start, run.attempt.abandoned):
+                records = {name: game.record for name, game in zip(REFERENCES, games, strict=True)}
+                outcomes[records[UPPER_BOUND]["episode"]] = {
+                    name: {"outcome": outcome_of(record), "error": str(record["error"])}
+                    for name, record in records.items()
+                }
+                run.on_progress(len(found) + len(outcomes), len(episodes))
+            write_checksums(file, folder, [], {"versions": versions_of_numbers(), "outcomes": outcomes})
+        found |= outcomes
     return found
 
 
@@ -171,13 +176,13 @@ def outcome_of(record: Mapping[str, Any]) -> str:
     return broken_by(record) or outcome if outcome == "goal" else outcome
 
 
-def _stored(file: Path, first: bool) -> dict[int, dict[str, str]] | None:
-    """The games that a driver has played; None if there are none of this version, or if some could not be played and
+def _stored(file: Path, first: bool) -> dict[int, dict[str, dict[str, str]]] | None:
+    """Games that the drivers have played; None if there are none of this version, or if some could not be played and
     this is the command's first attempt, which plays them again."""
     record = intact_record(file, file.parent, versions=versions_of_numbers()) or {}
     try:
-        outcomes = {int(episode): {**outcome} for episode, outcome in record["outcomes"].items()}
-        failed = any(each["error"] for each in outcomes.values())
+        outcomes = {int(episode): {**of_drivers} for episode, of_drivers in record["outcomes"].items()}
+        failed = any(each["error"] for of_drivers in outcomes.values() for each in of_drivers.values())
     except (LookupError, AttributeError, TypeError, ValueError):
         return None
     return None if first and failed else outcomes
