@@ -31,6 +31,7 @@ ROOT = Path(__file__).parents[2]
 PUBLISHED = Path(__file__).with_name("published.toml")
 LONG_TABLES = ("conduct", "episodes", "training")
 DOCUMENTS = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+_SHIPPED_TRAININGS = 3
 
 
 class Step(Document):
@@ -109,11 +110,13 @@ def carry_out(step: Step, root: Path) -> None:
 
 
 def people_of(run: Path) -> list[Path]:
-    """The policies of a run's personas: the network of all of them for each seed, if they learned together."""
+    """The policies of a run's personas from its first three trainings: the network of all of them for each seed, if
+    they learned together. A league meets every one of them."""
     policies = run / "policies"
     together = sorted(policies.glob(f"{strategy_name(ManyPersonas(personas=()))}-seed*"))
     personas = json.loads((run / "manifest.json").read_bytes())["personas"]
-    return together or [each for name in personas for each in sorted(policies.glob(f"{name}-seed*"))]
+    apart = [each for name in personas for each in sorted(policies.glob(f"{name}-seed*"))[:_SHIPPED_TRAININGS]]
+    return together[:_SHIPPED_TRAININGS] or apart
 
 
 def _replace(target: Path, sources: list[Path]) -> None:

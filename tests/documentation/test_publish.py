@@ -77,17 +77,19 @@ def test_carry_out__a_copied_folder_replaces_the_one_before(tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("policies", "people"),
     [
-        (["naive", "anna", "careful", "retrained_anna", "bert"], ["anna-seed1", "bert-seed1"]),
-        (["naive", "people", "anna", "bert", "robust"], ["people-seed1"]),
+        (["naive", "anna", "careful", "retrained_anna", "bert"], ["anna", "bert"]),
+        (["naive", "people", "anna", "bert", "robust"], ["people"]),
     ],
 )
-def test_people__of_a_run_are_its_personas_or_their_one_network(
+def test_people__of_a_run_are_its_personas_or_their_one_network_from_its_first_three_trainings(
     tmp_path: Path, policies: list[str], people: list[str]
 ) -> None:
     for name in policies:
-        (tmp_path / "policies" / f"{name}-seed1").mkdir(parents=True)
+        for seed in (11, 12, 13, 14):
+            (tmp_path / "policies" / f"{name}-seed{seed}").mkdir(parents=True)
     (tmp_path / "manifest.json").write_text('{"personas": ["anna", "bert"], "baseline": "careful"}')
-    assert [each.name for each in publish.people_of(tmp_path)] == people
+    expected = [f"{name}-seed{seed}" for name in people for seed in (11, 12, 13)]
+    assert [each.name for each in publish.people_of(tmp_path)] == expected
 
 
 def test_carry_out__the_long_tables_of_a_packed_run_are_compressed(tmp_path: Path) -> None:
