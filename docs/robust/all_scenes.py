@@ -63,7 +63,8 @@ def fails(games: pd.DataFrame) -> str:
 
 @app.command()
 def seeds(folder: Folder) -> None:
-    """Failures of the naive and the robust ego of each training, alone, beside SUMO's driver and beside people."""
+    """Failures of the naive and the robust ego of each training, alone, beside SUMO's driver and beside people. Kinds
+    of games that no ego has played have no row."""
     print("| games | ego | " + " | ".join(f"seed {seed}" for seed in SEEDS) + " |")
     print("| --- | --- |" + " ---: |" * len(SEEDS))
     rows: dict[tuple[str, str], list[str]] = {}
@@ -78,7 +79,7 @@ def seeds(folder: Folder) -> None:
                 "alone": known & (games["person"] == NOBODY),
                 "beside SUMO's driver": known & (games["person"] == SUMO_DRIVER),
                 "people that the robust ego has met": known & of_person & of_met & ~later,
-                "other trainings of these people": known & of_person & ~of_met & ~later,
+                "other people of scenes where it met some": known & of_person & ~of_met & ~later,
                 "people of scenes where it met none": known & of_person & later,
                 "all games of the other scenes": ~known,
             }
@@ -89,8 +90,9 @@ def seeds(folder: Folder) -> None:
         both = both[both["scene_naive"].isin(with_people) & ~both["person_naive"].isin(UNTRAINED)]
         p_values.append(f"{mcnemar(both['ego_failed_naive'] - both['ego_failed_robust'], 'two-sided'):.2g}")
     for (part, ego), cells in sorted(rows.items(), key=lambda row: list(parts).index(row[0][0])):
-        print(f"| {part} | {ego} | {' | '.join(cells)} |")
-    print(f"| the first two kinds of people, both egos | p (McNemar) | {' | '.join(p_values)} |")
+        if any(not each.endswith(" of 0") for each in cells):
+            print(f"| {part} | {ego} | {' | '.join(cells)} |")
+    print(f"| people of scenes where it met some, both egos | p (McNemar) | {' | '.join(p_values)} |")
 
 
 @app.command()

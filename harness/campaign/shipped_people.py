@@ -1,8 +1,5 @@
 """The shipped people of a scene: the policies in `policies/<scene>/` of players other than the ego, one for each person
-or one of several persons (`drivers.policy_of_many`).
-
-Their personas are the shipped ones. A persona that has changed since they learned is beside them as it was then, as in
-`policies/<scene>/speedy.toml`, until they learn anew.
+or one of several persons (`drivers.policy_of_many`). Their personas are the shipped ones.
 """
 
 from __future__ import annotations
@@ -18,7 +15,7 @@ from harness.drivers.policy_file import LearnedDriver, Policy, persona_hash, pol
 from harness.drivers.policy_of_many import as_persona, personas_in, read_policy_of_many
 from harness.errors import UsageError
 from harness.game.roles import EGO, ROLES
-from harness.shipped_documents import find_document, shipped
+from harness.shipped_documents import shipped
 
 SEED = "-seed"
 """Between the name and the training seed of a policy."""
@@ -29,7 +26,6 @@ class People:
     """Persons of a scene who learned with the same training seeds."""
 
     personas: list[str]
-    """By the names of their documents, of those beside the policies by their paths."""
     seeds: list[int]
     together: bool
     """Whether there is one policy of all of them for each seed."""
@@ -39,20 +35,13 @@ def people_of(scene: Path) -> list[People]:
     """The shipped people of a scene."""
     seeds: dict[tuple[str, bool], list[int]] = {}
     for person, together, seed, _ in _policies(scene):
-        document = _document(scene, person)
-        named = person if document.parent == shipped("personas").resolve() else str(document)
-        seeds.setdefault((named, together), []).append(seed)
+        seeds.setdefault((person, together), []).append(seed)
     groups: dict[tuple[tuple[int, ...], bool], list[str]] = {}
     for (person, together), of_person in seeds.items():
         groups.setdefault((tuple(sorted(of_person)), together), []).append(person)
     return [
         People(personas=personas, seeds=list(own), together=together) for (own, together), personas in groups.items()
     ]
-
-
-def _document(scene: Path, person: str) -> Path:
-    """The document of a person's persona: the one beside its policies if there is one, else the shipped one."""
-    return find_document(person, shipped("policies") / scene.name, "personas")
 
 
 def _policies(scene: Path) -> Iterator[tuple[str, bool, int, Path]]:
@@ -118,7 +107,7 @@ def shipped_people(scene: Path) -> tuple[ShippedPerson, ...]:
         folders.setdefault(name, []).append(folder)
     people = []
     for name, own in folders.items():
-        file = _document(scene, name)
+        file = shipped("personas").resolve() / f"{name}.toml"
         person = ShippedPerson(persona=read_document(file, Persona), file=file, folders=tuple(own))
         for folder in own:
             person.policy(folder)

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import re
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from harness.campaign import shipped_people as module
-from harness.campaign.league_campaigns import _campaigns
-from harness.campaign.shipped_people import ShippedPerson, people_of, shipped_people
+from harness.campaign.shipped_people import ShippedPerson, shipped_people
 from harness.config.persona import Persona
 from harness.errors import UsageError
 from harness.game.observation_layout import LAYOUT
@@ -51,28 +47,6 @@ def test_without__leaves_out_one_training_counted_from_the_first_again() -> None
     ]
     only = replace(person, folders=(first,))
     assert only.without(0) == (first,)
-
-
-def test_people__of_a_persona_that_has_changed_since_have_its_former_document_beside_their_policies(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The document decides what they are: one with another payoff is refused, though the shipped one is theirs."""
-    policies = tmp_path / "paper_merge"
-    shutil.copytree(shipped("policies") / "paper_merge", policies)
-    monkeypatch.setattr(module, "shipped", lambda kind: tmp_path if kind == "policies" else shipped(kind))
-    scene, former = NETWORKS / "paper_merge", policies / "paper_speedy.toml"
-    text = (shipped("personas") / "paper_speedy.toml").read_text()
-    former.write_text(text)
-    assert [person.file for person in shipped_people(scene)] == [
-        NETWORKS.parent / "personas/paper_distracted.toml",
-        former,
-    ]
-    assert [each.personas for each in people_of(scene)] == [["paper_distracted", str(former)]]
-    (campaign,) = _campaigns(scene, {"driver": "sumo"}, 2)
-    assert campaign["personas"] == ["paper_distracted", str(former)]
-    former.write_text(re.sub(r"collision = [0-9.]+", "collision = 19.0", text))
-    with pytest.raises(UsageError, match="another payoff or limits"):
-        shipped_people(scene)
 
 
 def test_people__of_a_folder_that_is_no_shipped_scene_are_none(tmp_path: Path) -> None:

@@ -45,11 +45,22 @@ def test_seeds__tell_people_that_were_met_from_others(folder: Path, capsys: pyte
     assert "| alone | robust | 0 of 10 | 0 of 10 | 0 of 10 |" in lines
     assert "| people that the robust ego has met | naive | 12 of 20 | 12 of 20 | 12 of 20 |" in lines
     assert "| people that the robust ego has met | robust | 0 of 20 | 0 of 20 | 0 of 20 |" in lines
-    assert "| other trainings of these people | robust | 6 of 10 | 6 of 10 | 6 of 10 |" in lines
+    assert "| other people of scenes where it met some | robust | 6 of 10 | 6 of 10 | 6 of 10 |" in lines
     assert "| people of scenes where it met none | naive | 6 of 10 | 6 of 10 | 6 of 10 |" in lines
     assert "| people of scenes where it met none | robust | 0 of 10 | 0 of 10 | 0 of 10 |" in lines
     assert "| all games of the other scenes | naive | 0 of 20 | 0 of 20 | 0 of 20 |" in lines
-    assert lines[-1] == "| the first two kinds of people, both egos | p (McNemar) | 0.00049 | 0.00049 | 0.00049 |"
+    assert lines[-1] == "| people of scenes where it met some, both egos | p (McNemar) | 0.00049 | 0.00049 | 0.00049 |"
+
+
+def test_seeds__kinds_of_games_that_no_ego_played_have_no_row(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """People who learned after the egos are all other people."""
+    monkeypatch.setattr(tables, "SHIPPED", {("merge", 1)})
+    tables.seeds(folder)
+    output = capsys.readouterr().out
+    assert "has met" not in output
+    assert "| other people of scenes where it met some | naive | 18 of 30 | 18 of 30 | 18 of 30 |" in output
 
 
 def test_met__a_person_of_one_training_is_always_met() -> None:

@@ -135,9 +135,7 @@ def test_terminal__has_what_became_worse_or_better_by_arm_and_the_games_that_cha
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "runs", [("zebra", "crossing"), ("merge-robust-apart", "merge-robust", "merge-arms-race")], ids=len
-)
+@pytest.mark.parametrize("runs", [("zebra", "crossing"), ("merge-seeds", "merge-robust", "merge-arms-race")], ids=len)
 def test_compare__of_published_runs_fits_80_columns(runs, tmp_path):
     folders = [str(REPOSITORY / "reports" / name) for name in runs]
     done = harness("compare", *folders, "--out", tmp_path / "page.html", env={**os.environ, "COLUMNS": "80"})
