@@ -98,11 +98,12 @@ def test_page__a_link_to_elsewhere_is_not_sent(folder: Path, tmp_path: Path) -> 
 
 @pytest.mark.slow
 def test_page__of_a_run_of_three_seeds_has_at_most_3_mb() -> None:
-    """The published run with the most arms. Its page in the run folder has recorded games and figures of paths more."""
+    """The published run of three seeds with the most arms. Its page in the run folder has recorded games and figures of
+    paths more."""
     paths_bytes = 250_000
-    tables = published_tables(RunFolder(REPORTS / "merge-robust"))
+    tables = published_tables(RunFolder(REPORTS / "crossing"))
     assert len(tables.seeds) == 3
     assert len(tables.starts)
-    report = PublishedReport(RunFolder(REPORTS / "merge-robust")).answer("/")
+    report = PublishedReport(RunFolder(REPORTS / "crossing")).answer("/")
     assert report is not None
     assert len(report[1]) + GAMES_BYTES + paths_bytes < 3_000_000
