@@ -239,8 +239,8 @@ def _shown(replay: CourseReplay) -> BoolArray:
 
 def start_of(replay: CourseReplay, drawn: InitialState) -> InitialState:
     """The state in which a replay begins. What a recording does not hold, such as the friction, is that of `drawn`.
-    Only the ego and the opponent take part where the others are left out, and nobody that reaches its goal in this
-    step."""
+    Only the ego and the opponent take part where the others are left out. A player that reaches its goal in this step
+    is left out, too."""
     course, step = replay.course, replay.first_step
     x_m, y_m, heading_rad, speed_mps = course.players[step].T.copy()
     present = course.players_present[step] & course.players_present[step + 1]

@@ -61,9 +61,7 @@ def joined(arms: Sequence[SeatedArm]) -> tuple[SeatedArm, list[list[int]]]:
     Raises ValueError where a player takes part in some arms only, where SUMO drives it in some only, and for a shield
     in one of several arms.
     """
-    if len(arms) == 1:
-        return arms[0], [[0] * len(arms[0].drivers)]
-    if any(any(each.shields) for each in arms):
+    if len(arms) > 1 and any(any(each.shields) for each in arms):
         raise ValueError("a player with a shield has one driver")
     drivers, firsts = list[Mixture | None](), list[list[int]]()
     for of_player in zip(*(each.drivers for each in arms), strict=True):

@@ -36,9 +36,8 @@ ORDINARY, ORDINARY_PERSON = "SUMO’s driver", "ordinary person"
 TAKES_OVER = "UN R157’s driver takes over"
 MOST_LINES, MOST_INTERVALS = 8, 24
 """Lines of the table, and intervals below one another; with more of either it is dense."""
-_DOT_REM, _DENSE_DOT_REM, _MOST_REM, _MOST_OF_TABLE_REM = 0.42, 0.24, 1.6, 10.0
-"""The height of an interval, and in a dense table that of an interval and, at most, of those of all training seeds, and
-of those of all lines."""
+_DOT_REM, _DENSE_DOT_REM, _MOST_REM = 0.42, 0.24, 8.0
+"""The height of an interval, and in a dense table that of an interval and, at most, of all below one another."""
 AXES = (0.05, 0.1, 0.2, 0.4, 0.6, 1.0)
 """The ends that the common axis of failure rates may have."""
 
@@ -86,7 +85,7 @@ def failure_table(tables: RunTables, links: GameLinks) -> dict[str, Any] | None:
     top = next((end for end in AXES if end >= most), AXES[-1])
     intervals = len(lines) * len(tables.seeds)
     is_dense = len(lines) > MOST_LINES or intervals > MOST_INTERVALS
-    dense_dot_rem = min(_DENSE_DOT_REM, _MOST_REM / len(tables.seeds), _MOST_OF_TABLE_REM / intervals)
+    dense_dot_rem = min(_DENSE_DOT_REM, _MOST_REM / intervals)
     return {
         "columns": columns,
         "lines": lines,

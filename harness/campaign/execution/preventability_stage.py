@@ -30,7 +30,7 @@ from harness.campaign.storage.run_folder import JUDGED, TAKEN_OVER
 from harness.campaign.storage.versions import versions_of_numbers
 from harness.drivers.car import car_of
 from harness.drivers.mixture import mixture_of
-from harness.drivers.reference_drivers import REFERENCES, UPPER_BOUND, lane_width_of, reference_driver
+from harness.drivers.reference_drivers import REFERENCES, lane_width_of, reference_driver
 from harness.evaluation.competence import broken_by
 from harness.evaluation.tables import table_of, write_csv
 from harness.evaluation.trace_file import TraceReader
@@ -159,7 +159,7 @@ def _from_start(
             outcomes = {}
             for games in assess_arms(arms, run.attempt.batches(part), run.on_start, run.attempt.abandoned):
                 records = {name: game.record for name, game in zip(REFERENCES, games, strict=True)}
-                outcomes[records[UPPER_BOUND]["episode"]] = {
+                outcomes[games[0].played["episode"]] = {
                     name: {"outcome": outcome_of(record), "error": str(record["error"])}
                     for name, record in records.items()
                 }
