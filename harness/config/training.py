@@ -113,9 +113,10 @@ class Retraining(Document):
     against: list[Name] = Field([], max_length=50)
     """Names of personas; `sumo`: SUMO's own driver; `shipped`: the shipped people of the scene, and of each of `roads`.
     One more ego, `robust`, is retrained against all of them, in equal shares of its games, and with a budget multiplied
-    by the number of names. It is also assessed against the other personas of the campaign, which it has not met in
-    training. Of the shipped people, one training of each is left out: the first of them for the first of `seeds`, and
-    so on. Where a scene has none, the others have their games, or SUMO's driver."""
+    by the number of names. It meets the people who learned with the other `seeds`, so that those against which it is
+    assessed are new to it; with a single seed, those of this seed. It is assessed against the other personas of the
+    campaign, too. Of the shipped people, one training of each is left out: the first of them for the first of `seeds`,
+    and so on. Where a scene has none, the others have their games, or SUMO's driver."""
 
 
 class Reconfiguration(Document):

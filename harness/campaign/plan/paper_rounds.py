@@ -75,7 +75,7 @@ def plan_robust(of: SeedStages, personas: Sequence[str]) -> list[Stage]:
     against = of.campaign.retraining.against
     if not against or not ego_learns(of.campaign):
         return []
-    stages: list[Stage] = [of.training(RobustEgo(), (of.mixture(dict.fromkeys(against, 1.0)),))]
+    stages: list[Stage] = [of.training(RobustEgo(), (of.strangers(against),))]
     stages += [of.assessment(Arm(ego=RobustEgo(), non_ego=other)) for other in (None, SumoNonEgo())]
     return stages + [of.assessment(against_persona(RobustEgo(), name), persona=name) for name in personas]
 

@@ -42,9 +42,9 @@ def plan(
     """
     seeds = [SeedStages(campaign=campaign, seed=seed, traits=traits) for seed in campaign.seeds]
     stages = list(_with_games_once(stage for of in seeds for stage in _plan_seed(of, personas, tunable)))
-    if campaign.policies is None:
-        return stages
-    return [each for each in stages if not isinstance(each, TrainingStage) or each.is_best_response]
+    if campaign.policies is not None:
+        stages = [each for each in stages if not isinstance(each, TrainingStage) or each.is_best_response]
+    return _after_needs(stages)
 
 
 def _plan_seed(of: SeedStages, personas: Sequence[str], tunable: bool) -> list[Stage]:
@@ -60,6 +60,23 @@ def _plan_seed(of: SeedStages, personas: Sequence[str], tunable: bool) -> list[S
     stages += plan_attribution(of)
     stages += compared
     return list(dict.fromkeys(stages))
+
+
+def _after_needs(stages: Sequence[Stage]) -> list[Stage]:
+    """The stages in their order, but for those of which an earlier one needs something: they come before it."""
+    named = {each.id: each for each in stages}
+    begun, ordered = set[Stage](), list[Stage]()
+
+    def add(stage: Stage) -> None:
+        if stage not in begun:
+            begun.add(stage)
+            for needed in stage.needs:
+                add(named[needed])
+            ordered.append(stage)
+
+    for stage in stages:
+        add(stage)
+    return ordered
 
 
 def _with_games_once(stages: Iterable[Stage]) -> Iterator[Stage]:

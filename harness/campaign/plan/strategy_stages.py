@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import PurePath
@@ -87,14 +87,23 @@ class SeedStages:
                 return (self._driver(strategy),)
 
     def mixture(self, shares: Mapping[str, float]) -> PlannedDriver:
-        """Personas, `sumo` or `shipped`, by their shares, one of which is drawn for each game; of one, its driver."""
-        members = tuple(map(self._named, shares))
-        return members[0] if len(members) == 1 else FixedMixture(members=members, shares=tuple(shares.values()))
+        """Personas by their shares, one of which is drawn for each game; of one, its driver."""
+        return _one_of((self._driver(PersonaNonEgo(persona=name)), share) for name, share in shares.items())
 
-    def _named(self, name: str) -> PlannedMember:
+    def strangers(self, names: Iterable[str]) -> PlannedDriver:
+        """Personas, `sumo` or `shipped` in equal shares, one of which is drawn for each game. The people are those who
+        learned with the other training seeds of the campaign; where there is no other, with this one."""
+        named = [self._strangers(name) for name in names]
+        return _one_of((driver, 1.0 / len(drivers)) for drivers in named for driver in drivers)
+
+    def _strangers(self, name: str) -> list[PlannedMember]:
+        seeds = self.campaign.seeds
+        if name == SUMO:
+            return [SumoDriven()]
         if name == SHIPPED:
-            return Shipped(without=self.campaign.seeds.index(self.seed))
-        return self._driver(SumoNonEgo() if name == SUMO else PersonaNonEgo(persona=name))
+            return [Shipped(without=seeds.index(self.seed))]
+        others = [seed for seed in seeds if seed != self.seed] or [self.seed]
+        return [replace(self, seed=seed)._driver(PersonaNonEgo(persona=name)) for seed in others]
 
     def pair(self, ego: EgoStrategy, non_ego: PersonaNonEgo | RoundAnswer) -> AssessmentStage:
         """The assessment of an ego against a person."""
@@ -172,6 +181,12 @@ class SeedStages:
         if self.campaign.policies is None or is_derived:
             return Trained(stage=stage, persona=persona)
         return TrainedBefore(stage=stage, persona=persona)
+
+
+def _one_of(drivers: Iterable[tuple[PlannedMember, float]]) -> PlannedDriver:
+    """Drivers by their shares, one of which is drawn for each game; of one, this one."""
+    members, shares = zip(*drivers, strict=True)
+    return members[0] if len(members) == 1 else FixedMixture(members=members, shares=shares)
 
 
 def training_settings(campaign: Campaign, stage: TrainingStage) -> Training:

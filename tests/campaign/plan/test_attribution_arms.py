@@ -22,7 +22,7 @@ BASELINE = {"attribution": {"baseline": str(CAREFUL)}}
 
 
 def test_plan__the_person_without_each_trait_and_the_baseline_with_each_alone() -> None:
-    stages, without = stages_of("anna", traits=TRAITS), stages_of("anna")
+    stages, without = stages_of("anna", "bert", traits=TRAITS), stages_of("anna", "bert")
     assert {name: stages[name] for name in without} == without
     added = [name for name in stages if name not in without and "bert" not in name]
     assert added == [
@@ -37,7 +37,7 @@ def test_plan__the_person_without_each_trait_and_the_baseline_with_each_alone() 
 
 
 def test_plan__the_baseline_is_trained_as_a_persona_of_round_1_and_nothing_else_is() -> None:
-    stages, without = stages_of("anna", traits=TRAITS), stages_of("anna")
+    stages, without = stages_of("anna", "bert", traits=TRAITS), stages_of("anna", "bert")
     trainings = {name for name, stage in stages.items() if isinstance(stage, TrainingStage) and name not in without}
     assert trainings == {"cleo"}
     cleo, anna = stages["cleo"], stages["anna"]
@@ -46,7 +46,7 @@ def test_plan__the_baseline_is_trained_as_a_persona_of_round_1_and_nothing_else_
 
 
 def test_plan__of_a_payoff_the_policy_is_exchanged_and_of_a_limit_it_is_not() -> None:
-    stages = stages_of("anna", traits=TRAITS)
+    stages = stages_of("anna", "bert", traits=TRAITS)
 
     def person(arm: str) -> Any:
         (driver,) = stages[arm].non_ego
@@ -78,7 +78,7 @@ def test_plan__a_person_with_one_trait_is_the_baseline_without_it() -> None:
 
 
 def test_plan__an_ego_that_is_not_trained_works_too() -> None:
-    stages = stages_of("anna", traits=TRAITS, ego={"driver": "sumo"})
+    stages = stages_of("anna", "bert", traits=TRAITS, ego={"driver": "sumo"})
     arm = stages["naive_vs_anna_with_payoff_of_cleo"]
     assert (arm.ego, arm.needs) == ((SumoDriven(),), ("cleo-seed1",))
 

@@ -64,6 +64,22 @@ def test_plan__an_ego_retrained_against_sumos_driver_too_meets_it_in_an_equal_sh
     assert training_settings(campaign, robust).steps == 3 * campaign.training.steps
 
 
+def test_plan__an_ego_retrained_against_several_learns_with_people_of_the_other_training_seeds() -> None:
+    asked = {**ASKED, "retraining": {"against": ["sumo", "anna"]}, "seeds": [7, 8, 9]}
+    campaign = campaign_of(*PERSONAS, **asked)
+    stages = plan(campaign, PERSONAS)
+    robust = next(each for each in stages if each.id == "robust-seed8")
+    assert isinstance(robust, TrainingStage)
+    people = tuple(Trained(stage=f"anna-seed{seed}", persona="anna") for seed in (7, 9))
+    assert robust.opponent == (FixedMixture(members=(SumoDriven(), *people), shares=(1.0, 0.5, 0.5)),)
+    assert training_settings(campaign, robust).steps == 2 * campaign.training.steps
+    assert next(each for each in stages if each.id == "robust_vs_anna-seed8").needs == ("robust-seed8", "anna-seed8")
+    done = set[str]()
+    for stage in stages:
+        assert done.issuperset(stage.needs), stage.id
+        done.add(stage.id)
+
+
 def test_plan__an_ego_retrained_against_shipped_people_meets_all_their_trainings_but_one_of_each() -> None:
     campaign = campaign_of(seeds=[7, 8], retraining={"against": ["sumo", "shipped"]})
     robust = [each for each in plan(campaign, []) if isinstance(each, TrainingStage) and each.name == "robust"]
