@@ -15,7 +15,14 @@ from tests.support.scripts import script
 
 table = script("robust/robust_egos.py")
 
-FAILED = {"naive_vs_anna": [1, 2], "robust_vs_anna": [0, 3], "naive_vs_bert": [4, 4], "robust_vs_bert": [1, 0]}
+RESPONSE = "robust_vs_bert_non_ego_response"
+FAILED = {
+    "naive_vs_anna": [1, 2],
+    "robust_vs_anna": [0, 3],
+    "naive_vs_bert": [4, 4],
+    "robust_vs_bert": [1, 0],
+    RESPONSE: [2, 3],
+}
 """Of ten games, by training seed. Anna is met in training."""
 
 
@@ -31,7 +38,7 @@ def run(tmp_path: Path) -> Path:
             "ego_mean_speed_mps": 9.7 if arm == "robust_alone" else 10.0,
             "ego_max_deceleration_mps2": 8.0 if arm == "robust_vs_bert" and k < 3 else 2.0,
         }
-        for arm, seed, k in product(arms, (1, 2), range(10))
+        for arm, seed, k in product([*arms, RESPONSE], (1, 2), range(10))
     ]
     games.append({**games[0], "ego_outcome": "error", "ego_failed": None})
     pd.DataFrame(games).to_csv(tmp_path / "episodes.csv.gz", index=False)
@@ -54,9 +61,10 @@ def test_persons__a_row_for_each_with_rates_over_all_seeds(run: Path, capsys: py
 
 def test_bounds__each_is_that_of_the_worst_person(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     table.bounds(run)
-    *_, met, others, preventable, slower, hard = capsys.readouterr().out.splitlines()
+    *_, met, others, response, preventable, slower, hard = capsys.readouterr().out.splitlines()
     assert met.endswith("| 15.0% (3.2% to 37.9%) against anna |")
     assert others.endswith("| 5.0% (0.1% to 24.9%) against bert |")
+    assert response.endswith("| 25.0% (8.7% to 49.1%) against bert |")
     assert preventable.endswith("| 5.00% from the danger on, 15.00% from the start |")
     assert slower.endswith("| 3.0% |")
     assert hard.endswith("| 30.0% (11.9% to 54.3%) against bert |")

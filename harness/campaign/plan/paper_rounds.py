@@ -21,7 +21,7 @@ from collections.abc import Iterator, Sequence
 
 from harness.campaign.plan.alone_bounds import alone_bounds
 from harness.campaign.plan.stages import AssessmentStage, SearchStage, Stage, TrainingStage
-from harness.campaign.plan.strategy_stages import SeedStages, ego_learns, has_round_2
+from harness.campaign.plan.strategy_stages import SeedStages, ego_learns, has_round_2, robust_answers
 from harness.config.campaign import Campaign
 from harness.evaluation.competence import Question, ResearchQuestion
 from harness.evaluation.planned_tests import Family, families
@@ -104,7 +104,7 @@ def questions(campaign: Campaign, personas: Sequence[str], tunable: bool = False
         pairs: list[tuple[ResearchQuestion, Arm, Arm]] = [("RQ1", NAIVE_ALONE, naive)]
         if ego_learns(campaign) and has_round_2(campaign):
             pairs.append(("RQ2", naive, against_persona(RetrainedEgo(against=name), name)))
-        elif ego_learns(campaign) and campaign.retraining.against and name in personas:
+        elif robust_answers(campaign) and name in personas:
             pairs.append(("RQ2", naive, against_persona(RobustEgo(), name)))
         elif tunable:
             pairs.append(("RQ2", naive, against_persona(ReconfiguredEgo(against=name), name)))

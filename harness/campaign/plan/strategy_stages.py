@@ -58,6 +58,11 @@ def has_round_2(campaign: Campaign) -> bool:
     return campaign.rounds.count >= PAPER_ROUNDS
 
 
+def robust_answers(campaign: Campaign) -> bool:
+    """Whether the ego that answers people is the one that is retrained against several: none is against one alone."""
+    return ego_learns(campaign) and not has_round_2(campaign) and bool(campaign.retraining.against)
+
+
 def crossplay_name(written: str) -> str:
     """The name of a driver in arms, which are names of files too: that of its document or folder, with "_" for all but
     letters and digits. `naive_seed1` for `policies/paper_merge/naive-seed11`."""

@@ -80,6 +80,15 @@ def test_plan__an_ego_retrained_against_several_learns_with_people_of_the_other_
         done.add(stage.id)
 
 
+def test_plan__best_responses_are_those_to_the_ego_retrained_against_several_where_none_is_against_one() -> None:
+    stages = plan(campaign_of(*PERSONAS, **ASKED, best_response={"steps": 1000, "starts": 1}), PERSONAS)
+    measured = [
+        each.name for each in stages if isinstance(each, AssessmentStage) and each.arm.best_response_of is not None
+    ]
+    players = ("ego", "non_ego")
+    assert measured == [f"robust_vs_{name}_{player}_response" for name in PERSONAS for player in players]
+
+
 def test_plan__an_ego_retrained_against_shipped_people_meets_all_their_trainings_but_one_of_each() -> None:
     campaign = campaign_of(seeds=[7, 8], retraining={"against": ["sumo", "shipped"]})
     robust = [each for each in plan(campaign, []) if isinstance(each, TrainingStage) and each.name == "robust"]
