@@ -19,6 +19,7 @@ import typer
 from scipy.stats import binomtest
 
 HARD_BRAKING_MPS2 = 7.5
+RESPONSE = "_non_ego_response"  # the end of the name of an arm
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, help=__doc__)
 Run = Annotated[Path, typer.Argument(metavar="RUN", help="The folder of a run.")]
 Apart = Annotated[Path, typer.Argument(metavar="RUN", help="The same with a training for each persona.")]
@@ -67,18 +68,19 @@ def bounds(run: Run) -> None:
     games = games.assign(brakes_hard=games["ego_max_deceleration_mps2"] > HARD_BRAKING_MPS2)
 
     def worst(column: str, among: list[str], response: str = "") -> str:
-        arms = {name: games.loc[games["arm"] == f"robust_vs_{name}{response}", column] for name in among}
-        marked = {name: own for name, own in arms.items() if len(own)}
-        name = max(marked, key=lambda each: marked[each].mean(), default="")
-        return f"{rate(marked[name])} against {name}" if name else "not trained"
+        marked = {name: games.loc[games["arm"] == f"robust_vs_{name}{response}", column] for name in among}
+        name = max(marked, key=lambda each: marked[each].mean())
+        return f"{rate(marked[name])} against {name}"
 
+    answered = [name for name in names if f"robust_vs_{name}{RESPONSE}" in set(games["arm"])]
+    by_response = worst("ego_failed", answered, RESPONSE) if answered else "not trained"
     naive, robust = (
         games.loc[games["arm"] == f"{ego}_alone", "ego_mean_speed_mps"].mean() for ego in ("naive", "robust")
     )
     lines = [
         ("fails against each person met in training", "≤ 1 %", worst("ego_failed", met)),
         ("fails against each other person", "≤ 2 %", worst("ego_failed", [each for each in names if each not in met])),
-        ("fails against a best response of each person", "≤ 3 %", worst("ego_failed", names, "_non_ego_response")),
+        ("fails against a best response of each person", "≤ 3 %", by_response),
         ("failures that the regulation's driver prevents", "≤ 0.5 % of games", _preventable(run)),
         ("slower alone than the naive ego", "≤ 2 %", f"{1.0 - robust / naive:.1%}"),
         (f"brakes harder than {HARD_BRAKING_MPS2:g} m/s²", "≤ 5 % of games", worst("brakes_hard", names)),

@@ -101,8 +101,8 @@ class Rounds(Document):
 
 
 class BestResponseSearch(Document):
-    """Best-response gap of each player of an arm: the gain from a change of its own strategy alone (equation 2), for the
-    last arm of each persona's rounds (with `rounds.count = 1` that of the robust ego, if any) and the arms named here."""
+    """Best-response gap of each player of an arm, the gain from a change of its own strategy alone (equation 2): of the
+    last arm of each persona's rounds (with `rounds.count = 1` the robust ego's, if any) and of the arms named here."""
 
     steps: int = Field(500_000, ge=1_000, le=1_000_000_000)
     """Budget of each training of a best response."""

@@ -21,7 +21,7 @@ from collections.abc import Iterator, Sequence
 
 from harness.campaign.plan.alone_bounds import alone_bounds
 from harness.campaign.plan.stages import AssessmentStage, SearchStage, Stage, TrainingStage
-from harness.campaign.plan.strategy_stages import SeedStages, ego_learns, has_round_2, robust_answers
+from harness.campaign.plan.strategy_stages import SeedStages, ego_learns, has_round_2, robust_is_last
 from harness.config.campaign import Campaign
 from harness.evaluation.competence import Question, ResearchQuestion
 from harness.evaluation.planned_tests import Family, families
@@ -75,7 +75,7 @@ def plan_robust(of: SeedStages, personas: Sequence[str]) -> list[Stage]:
     against = of.campaign.retraining.against
     if not against or not ego_learns(of.campaign):
         return []
-    stages: list[Stage] = [of.training(RobustEgo(), (of.strangers(against),))]
+    stages: list[Stage] = [of.training(RobustEgo(), (of.robust_opponent(against),))]
     stages += [of.assessment(Arm(ego=RobustEgo(), non_ego=other)) for other in (None, SumoNonEgo())]
     return stages + [of.assessment(against_persona(RobustEgo(), name), persona=name) for name in personas]
 
@@ -104,7 +104,7 @@ def questions(campaign: Campaign, personas: Sequence[str], tunable: bool = False
         pairs: list[tuple[ResearchQuestion, Arm, Arm]] = [("RQ1", NAIVE_ALONE, naive)]
         if ego_learns(campaign) and has_round_2(campaign):
             pairs.append(("RQ2", naive, against_persona(RetrainedEgo(against=name), name)))
-        elif robust_answers(campaign) and name in personas:
+        elif robust_is_last(campaign) and name in personas:
             pairs.append(("RQ2", naive, against_persona(RobustEgo(), name)))
         elif tunable:
             pairs.append(("RQ2", naive, against_persona(ReconfiguredEgo(against=name), name)))

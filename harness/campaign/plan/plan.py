@@ -13,7 +13,7 @@ from harness.campaign.plan.iterated_rounds import PersonaRounds, persona_rounds,
 from harness.campaign.plan.paper_rounds import plan_paper_rounds, plan_robust, plan_searches
 from harness.campaign.plan.planned_drivers import Shielded, members_of
 from harness.campaign.plan.stages import AssessmentStage, PreventabilityStage, Stage, TrainingStage
-from harness.campaign.plan.strategy_stages import SeedStages, crossplay_name, ego_learns, robust_answers
+from harness.campaign.plan.strategy_stages import SeedStages, crossplay_name, ego_learns, robust_is_last
 from harness.config.campaign import Campaign
 from harness.config.traits import UNREAD, PersonTraits
 from harness.evaluation.strategies import (
@@ -91,11 +91,10 @@ def _with_games_once(stages: Iterable[Stage]) -> Iterator[Stage]:
 
 
 def _plan_responses(of: SeedStages, rounds: Sequence[PersonaRounds], stages: Iterable[Stage]) -> list[Stage]:
-    """Best responses in the last pair of each persona's rounds, and in the arms that the campaign names. The last ego
-    is the robust one where none is retrained against one persona alone."""
+    """Best responses in the last pair of each persona's rounds, and in the arms that the campaign names."""
     if of.campaign.best_response is None:
         return []
-    robust = RobustEgo() if robust_answers(of.campaign) else None
+    robust = RobustEgo() if robust_is_last(of.campaign) else None
     last = [of.pair(robust or each.egos[-1], each.non_egos[-1]).name for each in rounds]
     assessments = {stage.name: stage for stage in stages if isinstance(stage, AssessmentStage)}
     names = dict.fromkeys((*last, *of.campaign.best_response.arms))

@@ -58,8 +58,8 @@ def has_round_2(campaign: Campaign) -> bool:
     return campaign.rounds.count >= PAPER_ROUNDS
 
 
-def robust_answers(campaign: Campaign) -> bool:
-    """Whether the ego that answers people is the one that is retrained against several: none is against one alone."""
+def robust_is_last(campaign: Campaign) -> bool:
+    """Whether the robust ego is the last one: none is retrained against one persona alone."""
     return ego_learns(campaign) and not has_round_2(campaign) and bool(campaign.retraining.against)
 
 
@@ -95,13 +95,13 @@ class SeedStages:
         """Personas by their shares, one of which is drawn for each game; of one, its driver."""
         return _one_of((self._driver(PersonaNonEgo(persona=name)), share) for name, share in shares.items())
 
-    def strangers(self, names: Iterable[str]) -> PlannedDriver:
-        """Personas, `sumo` or `shipped` in equal shares, one of which is drawn for each game. The people are those who
-        learned with the other training seeds of the campaign; where there is no other, with this one."""
-        named = [self._strangers(name) for name in names]
+    def robust_opponent(self, names: Iterable[str]) -> PlannedDriver:
+        """The opponent in the training of the robust ego: personas, `sumo` or `shipped` in equal shares, one of them in
+        each game. A persona has the policies of the other training seeds; of a single seed, its own."""
+        named = [self._met_by_robust(name) for name in names]
         return _one_of((driver, 1.0 / len(drivers)) for drivers in named for driver in drivers)
 
-    def _strangers(self, name: str) -> list[PlannedMember]:
+    def _met_by_robust(self, name: str) -> list[PlannedMember]:
         seeds = self.campaign.seeds
         if name == SUMO:
             return [SumoDriven()]
