@@ -42,7 +42,8 @@ _one_thread = ThreadpoolController().wrap(limits=1, user_api="blas")
 
 class CompiledPPO(PPO):
     """PPO for the policy that the harness trains: a diagonal Gaussian whose actor and critic have hidden layers of tanh
-    units of the same sizes and share none, in float32 on the CPU, by Adam and without clipping of values."""
+    units of the same sizes and share none, in float32 on the CPU, by Adam, with normalised advantages, and without
+    clipping of values or a largest KL divergence."""
 
     @_one_thread
     def collect_rollouts(
@@ -105,21 +106,17 @@ class CompiledPPO(PPO):
             clip=float(cast(Any, self.clip_range)(self._current_progress_remaining)),
             value_coefficient=float(self.vf_coef),
             entropy_coefficient=float(self.ent_coef),
-            normalize_advantages=bool(self.normalize_advantage),
-            target_kl=float("inf") if self.target_kl is None else float(self.target_kl),
         )
         update = Update(networks, adam, samples, objective, workspace_of(networks, minibatch))
         losses: list[FloatArray] = []
         for _ in range(self.n_epochs):
             shuffled = np.random.permutation(len(samples.returns))  # noqa: NPY002 - as SB3 draws it
-            of_epoch, ended = epoch(update, shuffled, minibatch, taken)
+            of_epoch = epoch(update, shuffled, minibatch, taken)
             losses.append(of_epoch)
             if not np.isfinite(of_epoch).all():
                 raise FloatingPointError("a loss of PPO is not finite")
-            taken += len(of_epoch) - ended
+            taken += len(of_epoch)
             self._n_updates += 1
-            if ended:
-                break
         put_vector(networks.parameters, order)
         for name, moment in (("exp_avg", adam.first_moment), ("exp_avg_sq", adam.second_moment)):
             for each in order:

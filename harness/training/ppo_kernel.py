@@ -43,13 +43,11 @@ class Samples(NamedTuple):
 
 
 class Objective(NamedTuple):
-    """The coefficients of PPO's loss. `target_kl` is infinite where it does not end an update."""
+    """The coefficients of PPO's loss."""
 
     clip: float
     value_coefficient: float
     entropy_coefficient: float
-    normalize_advantages: bool
-    target_kl: float
 
 
 class Update(NamedTuple):
@@ -74,7 +72,7 @@ def gradient(update: Update, chosen: IntArray) -> FloatArray:
     observations = work.observations[: size * inputs].reshape(size, inputs)
     for sample in range(size):
         observations[sample] = samples.observations[chosen[sample]]
-    _take_advantages(samples, chosen, update.objective.normalize_advantages, work.advantages)
+    _take_advantages(samples, chosen, work.advantages)
     output = forward(networks, observations, work.activations)
     units = networks.actor_units.sum() + networks.critic_units.sum()
     delta = work.deltas[(units - axes - 1) * size : units * size].reshape(axes + 1, size)
@@ -84,13 +82,13 @@ def gradient(update: Update, chosen: IntArray) -> FloatArray:
 
 
 @compiled
-def _take_advantages(samples: Samples, chosen: IntArray, normalize: bool, advantages: FloatArray) -> None:
+def _take_advantages(samples: Samples, chosen: IntArray, advantages: FloatArray) -> None:
     size = len(chosen)
     total = 0.0
     for sample in range(size):
         advantages[sample] = samples.advantages[chosen[sample]]
         total += advantages[sample]
-    if not normalize or size < 2:
+    if size < 2:
         return
     mean, squares = total / size, 0.0
     for sample in range(size):
@@ -136,22 +134,19 @@ def _loss(update: Update, chosen: IntArray, output: FloatArray, delta: FloatArra
 
 
 @compiled
-def epoch(update: Update, order: IntArray, minibatch: int, steps: int) -> tuple[FloatArray, bool]:
+def epoch(update: Update, order: IntArray, minibatch: int, steps: int) -> FloatArray:
     """One pass over the samples in `order` [N], a gradient step per minibatch, after `steps` gradient steps before.
 
-    Returns the losses [minibatches, LOSSES] and whether the KL divergence ended the pass: the gradient step of the last
-    minibatch is then not taken. A loss that is not finite is in the losses, and its gradient step is not taken.
+    Returns the losses [minibatches, LOSSES]. One that is not finite is the last, and its gradient step is not taken.
     """
     losses = np.zeros(((len(order) + minibatch - 1) // minibatch, LOSSES))
     for batch in range(len(losses)):
         chosen = order[batch * minibatch : (batch + 1) * minibatch]
         losses[batch] = gradient(update, chosen)
         if not np.isfinite(losses[batch]).all():
-            return losses[: batch + 1], False
-        if losses[batch, APPROXIMATE_KL] > 1.5 * update.objective.target_kl:
-            return losses[: batch + 1], True
+            return losses[: batch + 1]
         adam_step(update.networks.parameters, update.work.gradient, update.adam, steps + batch + 1)
-    return losses, False
+    return losses
 
 
 @compiled
