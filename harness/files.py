@@ -16,6 +16,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
+from harness.errors import UsageError
+
 _SCRATCH = ".part"
 MOST_HASHED_BYTES = 2_000_000_000
 _BLOCK_BYTES = 1_000_000
@@ -61,6 +63,17 @@ def drop_scratch(folder: Path) -> None:
     """Remove the temporary files of killed processes in a folder and its subfolders."""
     for scratch in folder.rglob(f".*{_SCRATCH}"):
         scratch.unlink(missing_ok=True)
+
+
+def check_new_file(file: Path, option: str = "") -> None:
+    """Raise UsageError unless a file of this name can be written: a command says so before it starts to work.
+
+    `option` is the one of the command line that names the file; empty where it is an argument."""
+    place, name = (option, str(file)) if option else (str(file), "")
+    if file.is_dir():
+        raise UsageError.of(place, name, "is a folder", "name a file")
+    if not file.absolute().parent.is_dir():
+        raise UsageError.of(place, name, f"there is no folder {file.parent}", "create it, or name another file")
 
 
 def make_folder(folder: Path) -> None:

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from harness.files import content_of, digest_of_file, write_atomically
+from harness.errors import UsageError
+from harness.files import check_new_file, content_of, digest_of_file, write_atomically
 
 
 def test_write_atomically__writes_and_replaces(tmp_path: Path) -> None:
@@ -39,6 +40,14 @@ def test_write_atomically__a_failure_leaves_only_the_old_file(tmp_path: Path, mo
 def test_write_atomically__a_missing_folder_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         write_atomically(tmp_path / "nowhere" / "table.csv", b"")
+
+
+def test_check_new_file__wants_a_folder_that_is_there_and_a_file(tmp_path: Path) -> None:
+    check_new_file(tmp_path / "results.xml")
+    with pytest.raises(UsageError, match=r"--junit: .*results\.xml: there is no folder .*nowhere \(create it"):
+        check_new_file(tmp_path / "nowhere" / "results.xml", "--junit")
+    with pytest.raises(UsageError, match=r"is a folder \(name a file\)"):
+        check_new_file(tmp_path)
 
 
 def test_digest_of_file__reads_in_blocks(tmp_path: Path) -> None:

@@ -46,6 +46,8 @@ def open_league(
 ) -> list[OpenCampaign]:
     """Write the campaigns of a league into its folder, and open them. `scenes` are names or folders; none: every
     shipped scene. With a `shield`, the ego plays each game with it too. Raises UsageError with every problem found."""
+    if folder.exists() and not folder.is_dir():
+        raise UsageError.of("--out", str(folder), "is a file", "name a folder")
     problems: list[Problem] = []
     names = scenes or shipped_names("networks")
     found = [collect(problems, partial(_scene_at, each)) for each in names]

@@ -23,7 +23,7 @@ from harness.drivers.policy_origin import other_games
 from harness.errors import Problem, UsageError, collect
 from harness.game.roles import EGO, NON_EGO, ROLES
 from harness.road.scene.open_scene import OpenScene
-from harness.shipped_documents import find_document
+from harness.shipped_documents import find_document, shipped_names
 
 DRIVER = "driver.toml"
 """The driver document in the folder of a policy that others trained, or of a search."""
@@ -37,7 +37,9 @@ def find_policies(file: Path, written: str | None, exist: bool = True) -> Path |
     check_no_archive(file, "policies", written, folder)
     if exist and not os.path.isdir(folder):
         beside = f"there is no folder {folder.parent}"
-        if os.path.isdir(folder.parent):
+        if "/" not in written:
+            beside = nearest(written, shipped_names("policies"))
+        elif os.path.isdir(folder.parent):
             beside = nearest(
                 folder.name, [each.name for each in folder.parent.iterdir() if each.is_dir()] or ["(no folder)"]
             )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -104,7 +105,18 @@ def check(
             if as_json:
                 print_json({"scene": str(folder), "in_order": True, "remarks": lines[1:]})
             return
-        _check_campaign(document_at(file, "campaigns"), allow_code, as_json, console)
+        campaign = document_at(file, "campaigns")
+        _check_kind(campaign)
+        _check_campaign(campaign, allow_code, as_json, console)
+
+
+def _check_kind(file: Path) -> None:
+    """Raise UsageError if a file is a persona or a driver, which other commands check."""
+    text = file.read_text(encoding="utf-8", errors="replace") if file.is_file() else ""
+    if re.search(r"^\[(safety|operational|human)[\].]", text, re.MULTILINE):
+        raise UsageError.of(file, "", "is a persona, not a campaign", f"check it with: harness persona check {file}")
+    if re.search(r"^kind *=", text, re.MULTILINE):
+        raise UsageError.of(file, "", "is a driver, not a campaign", f"check it with: harness check-driver {file}")
 
 
 def _check_campaign(file: Path, allow_code: bool, as_json: bool, console: Console) -> None:
@@ -163,12 +175,13 @@ def columns(
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the page to this file.")] = None,
 ) -> None:
     """Print what the columns of tables and traces are, as Markdown: unit, formula and source of each."""
-    from harness.files import write_atomically
+    from harness.files import check_new_file, write_atomically
     from harness.reports.columns_page import columns_page
 
     if out is None:
         print(columns_page(), end="")
     else:
+        check_new_file(out, "--out")
         write_atomically(out, columns_page().encode())
 
 
@@ -221,8 +234,9 @@ def export_policy(
     """
     from harness.drivers.external import find_driver
     from harness.drivers.network_export import KINDS, export_network
-    from harness.files import write_atomically
+    from harness.files import check_new_file, write_atomically
 
+    check_new_file(out)
     document = out.with_suffix(".toml")
     for file in (out, document):
         if file.exists():

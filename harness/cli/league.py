@@ -53,14 +53,15 @@ def league(
             from harness.campaign.execution.run_league import play_league
             from harness.campaign.execution.worker_pool import WorkerPool
             from harness.campaign.league_campaigns import name_of, open_league
-            from harness.reports.league_page import league_terminal
+            from harness.reports.league_page import league_terminal, not_answered
 
             folder = out or Path("reports") / f"league-{name_of(ego)}"
-            names = [each.strip() for each in scenes.split(",")] if scenes is not None else []
+            names = [each.strip() for each in scenes.split(",") if each.strip()] if scenes is not None else []
             campaigns = open_league(ego, names, folder, episodes=episodes, shield=shield, allow_code=allow_code)
         with WorkerPool(None, jobs) as pool:
             outcome = play_league(name_of(ego), campaigns, folder, pool.of_run, console)
         console.print(league_terminal(outcome.table))
+        print_plain([f"{scene}: {reason}" for scene, reason in not_answered(outcome.table)], console, "dim")
         print_plain([f"League: {folder / 'league.html'}"], console)
         if as_json:
             print_json({"league": str(folder), **outcome.record})

@@ -10,7 +10,7 @@ from types import FrameType
 
 INTERRUPTED = "Interrupted."
 CONTINUES = f"{INTERRUPTED} Finished work is kept: run the same command again to continue."
-_CONTINUED = (["campaign"], ["demo"])
+_CONTINUED = (["campaign"], ["demo"], ["league"])
 _DELAYING = ("<frozen importlib", f"{os.sep}llvmlite{os.sep}")  # parts of file names: Python's import, the compiler
 _AGAIN_S = 0.05
 

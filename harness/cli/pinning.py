@@ -104,9 +104,12 @@ def regression(
     from rich.console import Console
 
     from harness.campaign.execution.regression import Regression
+    from harness.files import check_new_file
     from harness.reports.junit import write_junit
 
     console = Console()
+    if junit is not None:
+        check_new_file(junit, "--junit")
     with console.status(messages.reading(folder)):
         games = Regression(folder, ego, allow_code)
     played: list[PlayedAgain] = []

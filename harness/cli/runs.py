@@ -210,13 +210,12 @@ def compare(
     from rich.console import Console
 
     from harness.campaign.results.compare_runs import compare_runs
-    from harness.files import write_atomically
+    from harness.files import check_new_file, write_atomically
     from harness.reports import comparison_terminal as terminal
     from harness.reports.comparison_page import BETTER, WORSE
 
     console, page = Console(), out or folders[-1] / "compare.html"
-    if not page.absolute().parent.is_dir():
-        raise UsageError.of(page, "", f"there is no folder {page.parent}", "create it, or name another file with --out")
+    check_new_file(page)
     comparison = compare_runs(folders, [_address(each, page) for each in folders])
     write_atomically(page, comparison.page().encode())
     for run in folders:
@@ -231,7 +230,7 @@ def compare(
         if changed.row_count:
             console.print(changed, highlight=False)
         if left := len(transition.rows) - sum(row.verdict in (BETTER, WORSE) for row in transition.rows):
-            print_plain([f"{left} more figures are neither: the page has them"], console)
+            print_plain([f"{left} figures are neither better nor worse: the page has them"], console)
         if transition.counts:
             print_plain(["Games that changed"], console)
             console.print(terminal.change_table(transition), highlight=False)

@@ -23,7 +23,7 @@ from harness.config.scene import Scene
 from harness.config.toml_reading import nearest
 from harness.errors import UsageError
 from harness.files import write_atomically
-from harness.game.payoff_terms import FUZZY_QUANTITIES, GROUPS, TERMS, Term
+from harness.game.payoff_terms import FUZZY_QUANTITIES, GROUPS, TERMS, Form, Term
 
 DOCUMENTS: Mapping[str, Any] = {
     "campaign": Campaign,
@@ -92,8 +92,13 @@ def unit_of(key: str) -> str:
 
 def term_in_words(term: Term) -> str:
     """The meaning of a term: what its weight is multiplied by."""
-    if term.parameter:
-        return f"{term.meaning}; per second at 0, and 0 from {term.parameter} on"
+    match term.form:
+        case Form.BELOW:
+            return (
+                f"{term.meaning}; {'per second' if term.per_second else 'in full'} at 0, and 0 from {term.parameter} on"
+            )
+        case Form.FROM:
+            return f"{term.meaning}: in full from {term.parameter} on, and 0 below"
     return term.meaning + (", per second" if term.per_second and "second" not in term.meaning else "")
 
 

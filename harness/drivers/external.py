@@ -44,7 +44,7 @@ from harness.drivers.driver_files import (
 from harness.drivers.driver_kinds import driver_in_words, make_driver
 from harness.drivers.entry_points import entry_point, installed_names, version_of
 from harness.drivers.fmu import unconnected_inputs
-from harness.drivers.policy_file import check_no_archive, policy_files, read_policy
+from harness.drivers.policy_file import ARCHIVES, check_no_archive, policy_files, read_policy
 from harness.drivers.protocol import Driver, planner_of
 from harness.errors import DriverError, UsageError
 from harness.game.cartesian_view import CartesianRoad, CartesianView
@@ -179,7 +179,9 @@ class ExternalDriver:
             raise
         except Exception as error:  # a driver may raise any exception
             cause = str(error) if isinstance(error, DriverError) else f"{type(error).__name__}: {error}"
-            remedy = f"see harness check-driver {self.written}"
+            beside = self.place / Path(self.written).name
+            named = os.path.relpath(beside) if os.path.exists(beside) else self.written
+            remedy = f"see harness check-driver {named}"
             raise UsageError.of(self.written, "", f"the test decision failed: {cause}", remedy) from error
 
 
@@ -205,7 +207,7 @@ def find_driver(written: str, file: Path, key: str, allow_code: bool) -> Externa
             remedy = f"if you trust it, allow it on the command line: {ALLOW_CODE}"
             raise UsageError.of(place, "kind", f"this driver {runs}; a document can't give the permission", remedy)
         return _from_document(written, place, document)
-    if written.endswith(".toml") or "/" in written:
+    if "/" in written or place.suffix.lower() in {".toml", *ARCHIVES}:
         remedy = nearest_beside(place) if os.path.isdir(place.parent) else f"no folder {place.parent}"
         if is_name(written, "policies"):
             remedy += f"; {_shipped_policies_as(written)}"

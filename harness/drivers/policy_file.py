@@ -192,7 +192,7 @@ def check_no_archive(file: Path, key: str, written: str, path: Path, *, remedy: 
     The archive of a training library is never opened, because pickles in it are programs. `remedy` is added to the
     message.
     """
-    if path.suffix.lower() in ARCHIVES or os.path.isfile(path):
+    if os.path.isfile(path):
         what = "archives such as .zip, .pt and .pkl can carry pickles, which run code when they are opened"
         message = f"{written!r} is a file: {what}, so the harness does not read them"
         folder = "a policy is a folder with policy.safetensors and policy.json, as under <run>/policies/"

@@ -21,8 +21,8 @@ def neighbours_of(tracks: pd.DataFrame, stations: FloatArray, beside: IntArray) 
     """The rows [N] of the nearest road users of each row in the same frame, by highD's columns; NONE without one.
 
     `tracks` has `frame` and `width`, the body's length; `stations` [N, C] are places along each course, `beside` [N, 3]
-    the courses of the own lane and of those to the left and right. A body that overlaps lengthwise in another lane is
-    alongside.
+    the courses of the own lane and of those to the left and right. A body that overlaps lengthwise is alongside: in
+    the own lane it has no column, and is neither ahead nor behind.
     """
     count, length_m = len(tracks), tracks["width"].to_numpy()
     names = [
@@ -42,7 +42,7 @@ def neighbours_of(tracks: pd.DataFrame, stations: FloatArray, beside: IntArray) 
                 overlaps = np.abs(away_m) < 0.5 * (length_m[others] + length_m[row])
                 if alongside is not None:
                     found[alongside][row] = _nearest(others[overlaps], away_m[overlaps])
-                    others, away_m = others[~overlaps], away_m[~overlaps]
+                others, away_m = others[~overlaps], away_m[~overlaps]
                 found[ahead][row] = _nearest(others[away_m > 0.0], away_m[away_m > 0.0])
                 found[behind][row] = _nearest(others[away_m <= 0.0], away_m[away_m <= 0.0])
     return found

@@ -23,9 +23,8 @@ CHANGES: tuple[GameChange, ...] = get_args(GameChange)
 MOST_GAMES = 60
 """Of an arm, seed and change that are listed by their numbers."""
 NOTHING_IN_COMMON = "The runs have no arm and seed in common."
-DIFFERENT_STARTS = (
-    "The scenes or the first training seeds differ, so games have different starts: there are no pairs and no tests."
-)
+NO_PAIRS = "The games have different starts: no pairs, no tests."
+DIFFERENT_STARTS = "The scenes or the first training seeds differ: there are no pairs of games, and no tests."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,7 +77,7 @@ class Transition:
     @property
     def headline(self) -> str:
         """The result in one line."""
-        return headline(self.rows)
+        return headline(self.rows) if self.same_starts else NO_PAIRS
 
     @property
     def counts(self) -> dict[str, dict[GameChange, int]]:

@@ -42,6 +42,7 @@ def render_league(ego: str, table: pd.DataFrame, addresses: Sequence[str], faile
         .get_template("league.html.jinja")
         .render(
             ego=ego,
+            scenes=len(scenes),
             games=int(table["episodes"].sum() - table["errors"].sum()),
             columns=[person_in_words(each) for each in UNTRAINED],
             lines=[
@@ -53,7 +54,7 @@ def render_league(ego: str, table: pd.DataFrame, addresses: Sequence[str], faile
             tones=RISK_TONES,
             rows=[(address, list(_texts(row))) for row, address in zip(rows, addresses, strict=True)],
             failed=failed,
-            not_answered=dict.fromkeys((row["scene"], row["reason"]) for row in rows if row["reason"]),
+            not_answered=not_answered(table),
         )
     )
 
@@ -61,6 +62,12 @@ def render_league(ego: str, table: pd.DataFrame, addresses: Sequence[str], faile
 def _people(met: Mapping[str, list[FailureCell]]) -> dict[str, list[FailureCell]]:
     """The cells of the people among those that the ego meets in a scene, by person."""
     return {person: cells for person, cells in met.items() if person not in UNTRAINED}
+
+
+def not_answered(table: pd.DataFrame) -> list[tuple[str, str]]:
+    """Each scene with a reason for which its games say nothing, once."""
+    without = table[table["reason"].astype(bool)]
+    return list(dict.fromkeys(zip(without["scene"], without["reason"], strict=True)))
 
 
 def league_terminal(table: pd.DataFrame) -> Table:

@@ -11,7 +11,7 @@ from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from harness.errors import UsageError
-from harness.files import write_atomically
+from harness.files import check_new_file, write_atomically
 from harness.reports.numbers import duration, number, p_number, percent, short
 
 CONTENT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data: blob:"
@@ -79,6 +79,5 @@ def write_page(file: Path, page: str) -> None:
     """Write a page that a command was asked for. Raises UsageError when the file's name or folder is wrong."""
     if file.suffix.lower() not in (".html", ".htm"):
         raise UsageError.of("--html", str(file), "is not the name of a page", "it must end with .html")
-    if not file.absolute().parent.is_dir():
-        raise UsageError.of("--html", str(file), f"there is no folder {file.parent}", "create it, or name another file")
+    check_new_file(file, "--html")
     write_atomically(file, page.encode())

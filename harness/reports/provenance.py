@@ -11,7 +11,7 @@ from harness.reports.numbers import percent, steps_text
 if TYPE_CHECKING:
     from rich.console import Console
 
-QUICK = "Quick run: fewer training steps than table 1; not for conclusions."
+QUICK = "Quick run: trainings are shortened; not for conclusions."
 MIXED_VERSIONS = "This run mixes versions: its results may differ from those of a single version."
 THEN = ", then "
 

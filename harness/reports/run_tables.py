@@ -17,6 +17,7 @@ from harness.evaluation.rule_book.causes import cause_lines
 from harness.evaluation.start_space import Boundary
 from harness.evaluation.strategies import (
     NAIVE_ALONE,
+    NAIVE_VS_SUMO,
     Arm,
     EgoStrategy,
     NaiveEgo,
@@ -193,8 +194,11 @@ class RunTables:
         return {seed: row for seed, row in rows.items() if row is not None and played(row)}
 
     def counts_of(self, arm: str) -> tuple[int, int]:
-        """How many games of an arm the ego failed, and how many could be played, over all training seeds."""
-        rows = self.rates_of(arm).values()
+        """How many games of an arm the ego failed, and how many could be played, over all training seeds. Games without
+        a trained player are the same for each seed, and count once."""
+        driver = self.manifest.get("campaign", {}).get("ego", {}).get("driver", LEARNED)
+        is_untrained = driver != LEARNED and arm in (NAIVE_ALONE.name, NAIVE_VS_SUMO.name)
+        rows = list(self.rates_of(arm).values())[: 1 if is_untrained else None]
         return sum(map(failures, rows)), sum(map(played, rows))
 
     def games_of(self, arm: str) -> pd.DataFrame:

@@ -29,6 +29,7 @@ from harness.errors import FAILED, NOT_ACCEPTED, USAGE_ERROR, SimulationError
 from harness.evaluation.tables import read_csv
 from harness.evaluation.worst_first import FAILURES
 from tests.support.forked_command import can_fork
+from tests.support.repository import REPOSITORY
 from tests.support.tiny import (
     TABLES,
     assert_interrupted,
@@ -118,6 +119,20 @@ def test_check__lists_the_stages_and_writes_nothing(tmp_path: Path, run_command:
     assert lines[len(warnings) + 1] == "3 trainings of up to 2,048 steps, 6 arms of 4 episodes:"
     assert "  assess naive_vs_speedy-seed1  after naive-seed1, speedy-seed1" in lines
     assert list(tmp_path.iterdir()) == [campaign]
+
+
+@pytest.mark.parametrize(
+    ("file", "kind", "command"),
+    [
+        ("personas/speedy.toml", "a persona", "harness persona check"),
+        ("egos/adas.toml", "a driver", "harness check-driver"),
+    ],
+)
+def test_check__of_another_document_names_its_command(
+    file: str, kind: str, command: str, run_command: Callable[..., Result]
+) -> None:
+    path = REPOSITORY / file
+    assert run_command("check", path).err == f"{path}: is {kind}, not a campaign (check it with: {command} {path})\n"
 
 
 def test_report__needs_only_the_folder_even_after_a_move(tmp_path: Path, run_command: Callable[..., Result]) -> None:

@@ -13,7 +13,7 @@ import pytest
 from jsonschema import Draft202012Validator
 from pydantic import TypeAdapter, ValidationError
 
-from harness.config.json_schema import DIALECT, DOCUMENTS, UNITS, schema_of, schema_text, write_schemas
+from harness.config.json_schema import DIALECT, DOCUMENTS, UNITS, schema_of, schema_text, term_in_words, write_schemas
 from harness.errors import UsageError
 from harness.game.payoff_terms import FUZZY_QUANTITIES, GROUPS, TERMS
 from tests.support.repository import REPOSITORY
@@ -190,3 +190,9 @@ def test_schema__refuses_nothing_that_the_model_accepts(kind: str, path: Path) -
         if not validator.is_valid(without):
             assert not accepts(kind, without), f"{'.'.join(map(str, at))} left out"
     assert refused > 20
+
+
+def test_term__in_words_says_where_it_counts_in_full() -> None:
+    assert term_in_words(TERMS["stop_sign"]).endswith("once: in full from from_mps on, and 0 below")
+    assert term_in_words(TERMS["yield"]).endswith("once; in full at 0, and 0 from within_s on")
+    assert term_in_words(TERMS["clearance"]).endswith("; per second at 0, and 0 from within_m on")

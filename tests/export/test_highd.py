@@ -12,8 +12,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from harness.export.highd import highd_tables
-from harness.export.lane_courses import LaneCourses
+from harness.export.highd import highd_tables, neighbours_of
+from harness.export.lane_courses import NONE, LaneCourses
 from harness.road.scene.open_scene import OpenScene
 from tests.support.exports import exported, signals_game
 from tests.support.replays import drive, game, straight
@@ -71,6 +71,14 @@ def test_neighbours__that_overlap_are_alongside(merge: OpenScene) -> None:
     third = tracks[tracks["frame"] == 4].set_index("id")
     assert (third.loc[1, "rightAlongsideId"], third.loc[1, "rightPrecedingId"]) == (4, 0)
     assert (third.loc[4, "leftAlongsideId"], third.loc[4, "leftPrecedingId"]) == (1, 2)
+
+
+def test_neighbours__that_overlap_in_the_same_lane_are_neither_ahead_nor_behind() -> None:
+    tracks = pd.DataFrame({"frame": [1, 1, 1], "width": [5.0, 5.0, 5.0]})
+    stations, beside = np.array([[0.0], [4.9], [10.0]]), np.array([[0, NONE, NONE]] * 3)
+    found = neighbours_of(tracks, stations, beside)
+    assert found["precedingId"].tolist() == [2, 2, NONE]
+    assert found["followingId"].tolist() == [NONE, NONE, 1]
 
 
 def test_boxes__have_the_bodies_in_their_middle(merge: OpenScene) -> None:

@@ -344,7 +344,7 @@ POLICIES = [
         Bad(f"a policy: {name}", archive(name, f"../policies/{name}"), ("tiny.toml: ego.driver", "pickles", "policy.safetensors"))
         for name in ("ego.zip", "ego.pkl", "ego.pt", "ego.pth", "ego.ZIP", "ego.ckpt", "ego.bin", "ego")
     ),
-    Bad("a policy: an archive that is not there", edit(CAMPAIGN, "../policies/mine", "ppo.zip"), ("ego.driver", "pickles")),
+    Bad("a policy: an archive that is not there", edit(CAMPAIGN, "../policies/mine", "ppo.zip"), ("ego.driver", "there is no such file")),
     Bad("a policy: the parameters alone", edit(CAMPAIGN, "../policies/mine", "../policies/mine/policy.safetensors"), ("ego.driver",)),
     Bad("a policy: an archive under its parameters' name", put(TENSORS, b"PK\x03\x04" + bytes(500)), ("policy.safetensors",)),
     Bad("a policy: a folder of pickles", several(lambda project: shutil.rmtree(project / "policies" / "mine"), lambda project: (project / "policies" / "mine").mkdir(), lambda project: (project / "policies" / "mine" / "policy.pkl").write_bytes(pickle.dumps(1))), ("policy.json", "there is no such file")),

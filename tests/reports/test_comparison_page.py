@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import re
+from dataclasses import replace
 
 import pytest
 from rich.console import Console
@@ -56,6 +57,12 @@ def report(comparison, tmp_path_factory):
     path = tmp_path_factory.mktemp("comparison") / "compare.html"
     path.write_text(comparison.page(), encoding="utf-8")
     return path
+
+
+def test_headline__of_games_with_different_starts_says_that_nothing_is_compared(comparison):
+    transition = comparison.transitions[0]
+    assert transition.headline.startswith("Worse: ")
+    assert "no pairs, no tests" in replace(transition, same_starts=False).headline
 
 
 def test_histories__are_of_each_ego_against_each_person_in_every_run(comparison):

@@ -47,6 +47,15 @@ def page(html):
     return Page(html)
 
 
+@pytest.mark.parametrize(("driver", "games"), [("learned", 180), ("adas", 60)])
+def test_counts__games_without_a_trained_player_count_once(driver, games):
+    made = campaign(personas=["speedy"], seeds=[1, 2, 3], retrained=False)
+    made["manifest"]["campaign"]["ego"]["driver"] = driver
+    tables = RunTables(**made)
+    assert [tables.counts_of(arm)[1] for arm in ("naive_alone", "naive_vs_sumo")] == [games, games]
+    assert tables.counts_of("naive_vs_speedy")[1] == 180
+
+
 def test_page__a_table_too_long_for_a_page_is_left_to_its_file(small, monkeypatch):
     monkeypatch.setattr(page_module, "MOST_ROWS", 10)
     with blank_figures():

@@ -55,11 +55,14 @@ def _listed(run: Path, chosen: GameList) -> tuple[pd.DataFrame, int, int]:
     ordered = worst_first(_chosen(run, episodes_of(folder), chosen))
     causes = causes_in_words(read_csv(folder.result("causes.csv")))
     rows = chosen.rows or max(len(ordered), 1)
+    pages = max(-(-len(ordered) // rows), 1)
+    if chosen.page > pages:
+        raise UsageError.of("--page", str(chosen.page), "there is no such page", f"the last one is {pages}")
     games = ordered.iloc[(chosen.page - 1) * rows : chosen.page * rows]
     outcomes = [f"{name}_outcome" for name in ("ego", *people_in(games.columns))]
     found = [causes.get((game.arm, game.seed, game.episode), "") for game in games.itertuples()]
     games = games[["arm", "seed", "episode", *outcomes, "ego_min_ttc_s", "severity"]].assign(cause=found)
-    return games, len(ordered), max(-(-len(ordered) // rows), 1)
+    return games, len(ordered), pages
 
 
 def game_table(run: Path, chosen: GameList) -> Table:
@@ -163,7 +166,8 @@ def find_game(folder: RunFolder, arm: str, episode: int, seed: int | None) -> tu
     found = games[(games["episode"] == episode) & (games["seed"] == chosen_seed)]
     if found.empty:
         message = f"has no such game of seed {chosen_seed}"
-        remedy = f"episodes are {games['episode'].min()} to {games['episode'].max()}"
+        seeds = ", ".join(map(str, sorted(games["seed"].unique())))
+        remedy = f"episodes are {games['episode'].min()} to {games['episode'].max()}, training seeds {seeds}"
         raise UsageError.of(run, f"{arm} {episode}", message, remedy)
     (record,) = found.itertuples()
     if record.error:

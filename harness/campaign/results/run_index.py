@@ -27,11 +27,12 @@ _COUNTED = ("arm", "persona", "failure_rate", "collisions", "rails", "timeouts",
 
 
 def runs_in(folder: Path) -> list[IndexedRun]:
-    """The runs whose folders are in this one, those of the latest date first. Raises UsageError if it is no folder."""
+    """The runs whose folders are in this one, the latest first. Raises UsageError if it is no folder."""
     if not folder.is_dir():
         raise UsageError.of(folder, "", "is not a folder", "name the folder that the run folders are in")
     found = [indexed_run(file.parent) for file in sorted(folder.glob(f"*/{MANIFEST}"))]
-    return sorted(sorted(found, key=lambda run: run.name), key=lambda run: run.finished_on, reverse=True)
+    by_name = sorted(found, key=lambda run: run.name)
+    return sorted(by_name, key=lambda run: (run.finished_on, (run.folder / MANIFEST).stat().st_mtime), reverse=True)
 
 
 def indexed_run(path: Path) -> IndexedRun:

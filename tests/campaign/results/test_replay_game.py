@@ -54,6 +54,20 @@ def test_list__in_a_narrow_terminal_breaks_the_arm_and_the_cause_and_no_number(r
     assert lines[title + 3].split()[1:3] == ["1", str(worst_first(episodes[episodes["arm"] == arm])["episode"].iloc[0])]
 
 
+def test_list__has_no_page_after_the_last(run: Path) -> None:
+    assert "page 2 of 2" in printed_page(run, 2)
+    with pytest.raises(UsageError, match="the last one is 2"):
+        printed_page(run, 3)
+
+
+def printed_page(run: Path, page: int) -> str:
+    games = len(read_csv(run / "episodes.csv"))
+    console = Console(file=io.StringIO(), width=160)
+    console.print(game_table(run, GameList(rows=games - 1, page=page)))
+    assert isinstance(console.file, io.StringIO)
+    return console.file.getvalue()
+
+
 def test_report__makes_tables_of_the_log_anew_without_playing_a_game(run: Path) -> None:
     before = {name: (run / f"{name}.csv").read_bytes() for name in ("episodes", "causes", "manoeuvres")}
     for number, file in enumerate(sorted((run / ".stages").glob("*/tables.json"))):
