@@ -121,9 +121,20 @@ function valueAt(game, track, name, time) {
   return step === null ? NaN : track[name][step];
 }
 
-/** The time of the last contact, or the end of the game. */
+/** The time of the last contact, else that at which the ego is nearest to another player; the end without one. */
 function momentOf(game) {
-  return game.touches.length ? game.touches[game.touches.length - 1].time : game.duration;
+  if (game.touches.length) return game.touches[game.touches.length - 1].time;
+  const ego = game.players.find(track => track.name === "ego");
+  let moment = game.duration, least = Infinity;
+  for (const other of ego ? game.players.filter(track => track !== ego) : []) {
+    const from = Math.max(ego.first, other.first), to = Math.min(ego.first + ego.count, other.first + other.count);
+    for (let step = from; step < to; step++) {
+      const [own, its] = [step - ego.first, step - other.first];
+      const away = Math.hypot(ego.x[own] - other.x[its], ego.y[own] - other.y[its]);
+      if (away < least) [least, moment] = [away, step * game.step];
+    }
+  }
+  return moment;
 }
 
 const OUTCOMES = { goal: "goal reached", rail: "rail contact", collision: "collision", timeout: "out of time", "": "still driving" };

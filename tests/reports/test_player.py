@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 import pytest
@@ -84,6 +85,18 @@ def test_player__plays_and_pauses_without_an_error_or_a_request(player):
     page.wait_for_timeout(150)
     assert time_of(page) == stopped
     assert page.seen == []
+
+
+def test_player__opens_a_game_without_contact_where_the_ego_is_nearest_to_another(player, games):
+    name, game = next((name, game) for name, game in games.items() if game.outcome == "goal" and len(game.players) == 2)
+    (ego, other), count = game.players, min(len(each.columns["x_m"]) for each in game.players)
+    away = [
+        math.hypot(*(ego.columns[axis][step] - other.columns[axis][step] for axis in ("x_m", "y_m")))
+        for step in range(count)
+    ]
+    nearest = away.index(min(away))
+    assert nearest < count - 1
+    assert time_of(player(f"#game={name}")) == pytest.approx(nearest * STEP_S)
 
 
 def test_player__stops_at_the_end_and_restarts(player, games):
