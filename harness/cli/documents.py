@@ -112,7 +112,13 @@ def check(
 
 def _check_kind(file: Path) -> None:
     """Raise UsageError if a file is a persona or a driver, which other commands check."""
-    text = file.read_text(encoding="utf-8", errors="replace") if file.is_file() else ""
+    from harness.config.toml_reading import MOST_BYTES
+    from harness.files import content_of
+
+    try:
+        text = content_of(file, MOST_BYTES).decode(errors="replace")
+    except OSError:
+        return  # who reads it as a campaign says what is wrong
     if re.search(r"^\[(safety|operational|human)[\].]", text, re.MULTILINE):
         raise UsageError.of(file, "", "is a persona, not a campaign", f"check it with: harness persona check {file}")
     if re.search(r"^kind *=", text, re.MULTILINE):

@@ -75,7 +75,9 @@ class Mistakes(ValueError):
         super().__init__("; ".join(f"{key}: {message}" for key, message, _ in mistakes))
 
 
-_MOST_BYTES, _MOST_MISTAKES = 1_000_000, 100
+MOST_BYTES = 1_000_000
+"""Of a document."""
+_MOST_MISTAKES = 100
 _NAMES_SHOWN = 40
 _QUOTED = re.compile(r""""[^"\n]*"|'[^'\n]*'""")
 _ENDLESS_KEY = re.compile(r"(?<![\w.-])(?:[\w-]+[ \t]*\.[ \t]*){50}")
@@ -95,7 +97,7 @@ def read_document(path: str | Path, model: type[D]) -> D:
     path = Path(path)
     remedy = "a UTF-8 TOML file is needed"
     try:
-        text = content_of(path, _MOST_BYTES).decode("utf-8")
+        text = content_of(path, MOST_BYTES).decode("utf-8")
     except FileNotFoundError:
         raise UsageError.of(path, "", "there is no such file", _similar_file(path)) from None
     except OSError as error:
