@@ -27,7 +27,7 @@ ROAD = {"road.xml", "road.net", "road.demand", "road.scene"}
 CAMPAIGN = {"campaign", "campaign.plan", "campaign.storage", "campaign.execution", "campaign.results"}
 ROOMS: dict[str, set[str]] = {
     "errors": set(),
-    "files": set(),
+    "files": {"errors"},
     "version": set(),
     "shipped_documents": {"errors"},
     "game": set(),
