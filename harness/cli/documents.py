@@ -118,7 +118,7 @@ def _check_kind(file: Path) -> None:
     try:
         text = content_of(file, MOST_BYTES).decode(errors="replace")
     except OSError:
-        return  # who reads it as a campaign says what is wrong
+        return  # to read it as a campaign says what is wrong
     if re.search(r"^\[(safety|operational|human)[\].]", text, re.MULTILINE):
         raise UsageError.of(file, "", "is a persona, not a campaign", f"check it with: harness persona check {file}")
     if re.search(r"^kind *=", text, re.MULTILINE):

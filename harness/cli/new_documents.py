@@ -22,7 +22,7 @@ from harness.config.persona import Persona
 from harness.config.scene import Name
 from harness.config.toml_reading import read_document
 from harness.errors import Problem, UsageError
-from harness.files import write_atomically
+from harness.files import check_new_file, write_atomically
 from harness.game.payoff_terms import FUZZY_QUANTITIES, TERMS
 from harness.reports.page_template import environment_of
 from harness.shipped_documents import shipped
@@ -126,8 +126,8 @@ def create_persona(name: str, out: Path | None = None) -> Path:
         raise UsageError.of(path, "", "is not the name of a TOML file", "the name must end with .toml")
     if out is None:
         path.parent.mkdir(exist_ok=True)
-    elif not path.parent.is_dir():
-        raise UsageError.of(path, "", *messages.no_folder(path.parent))
+    else:
+        check_new_file(path)
     folder = path.resolve().parent
     schemas = (above / _SCHEMA for above in (folder, *folder.parents))
     schema = next((Path(os.path.relpath(file, folder)).as_posix() for file in schemas if file.is_file()), None)
