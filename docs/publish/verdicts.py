@@ -11,7 +11,7 @@ from typing import Any
 def verdicts_table(result: dict[str, Any]) -> str:
     """A row for each person and question, and how many of the bounds are kept."""
     lines = ["| person | question | answer | games |", "| --- | --- | --- | --- |"]
-    questions = {"RQ1": "Does this person make the ego fail?", "RQ2": "Did retraining fix it?"}
+    questions = {"RQ1": "Does this person cause failures?", "RQ2": "Does retraining help?"}
     for each in result["verdicts"]:
         question = f"{questions[each['question']]} ({each['question']})"
         lines.append(f"| {each['persona']} | {question} | {each['label']} | {each['sentence']} |")

@@ -37,15 +37,6 @@ class Encounter:
     """The time that the other would need to the zone at constant speed when the player enters; inf if it stands or has
     left, 0 if it is inside."""
 
-    @property
-    def post_encroachment_s(self) -> float:
-        """Post-encroachment time: from when the first leaves the zone until the second enters it; 0 if both are inside
-        at once, inf if only the player passes (Allen, Shin and Cooper 1978)."""
-        if self.other is None:
-            return np.inf
-        first, second = sorted((self.own, self.other))
-        return max(second.enters_s - first.leaves_s, 0.0)
-
 
 def encounters_of(q: Quantities, player: int, drove: BoolArray) -> list[Encounter]:
     """The encounters of a player, in the order in which it enters the zones.

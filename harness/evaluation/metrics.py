@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from harness.evaluation.column import NUMBER, SHARE, TEXT, Column
+from harness.evaluation.column import NUMBER, SHARE, Column
 from harness.evaluation.encounters import Encounter
 from harness.evaluation.recorded_game import RecordedGame
 from harness.game.arrays import BoolArray, FloatArray
@@ -176,24 +176,6 @@ def latest_red_s(drive: Drive) -> float | None:
 @metric("ego", "person", meaning="Time among oncoming lanes.")
 def wrong_way_s(drive: Drive) -> float:
     return float(drive.of("wrong_way").sum()) * drive.step_s
-
-
-@metric(
-    "ego",
-    meaning="Least post-encroachment time in a zone of conflict of a junction, from when the first leaves the zone "
-    "until the second enters it.",
-    source="Allen, Shin and Cooper 1978",
-)
-def min_pet_s(drive: Drive) -> float | None:
-    return finite(np.array([each.post_encroachment_s for each in drive.encounters]), np.min)
-
-
-@metric("ego", dtype=TEXT, meaning="Whether the `ego` or the `other` had priority in that passage.")
-def pet_priority(drive: Drive) -> str | None:
-    found = [each for each in drive.encounters if np.isfinite(each.post_encroachment_s)]
-    if not found:
-        return None
-    return "other" if min(found, key=lambda each: each.post_encroachment_s).must_yield else "ego"
 
 
 @metric(

@@ -26,7 +26,6 @@ NEAR_MISSES = "Near misses"
 HARM_TO_OTHERS = "Harm to others"
 WORST_KNOWN_OPPONENT = "Against its worst known opponent"
 PRICE = "Price of {doing} in speed"
-PARTLY = "Partly"
 OFTEN = 0.1
 """A share of games from which a figure is shown as a warning."""
 
@@ -167,11 +166,8 @@ def portrait(document: Mapping[str, Any]) -> str:
 
 
 def card_verdict(question: str, answer: Answer, figures: Sequence[KeyFigure]) -> dict[str, Any]:
-    """An answer with its question in plain words, as a persona's card shows it: an ego that fails less is mended only
-    partly where a key figure warns. `caution` is what the answer does not say; empty if nothing."""
-    label, tone, caution = answer.label[:1].upper() + answer.label[1:], answer.tone, ""
-    warnings = [each for each in figures if each.warns]
-    if tone == "mended" and warnings:
-        label, tone = PARTLY, "open"
-        caution = " ".join(f"But {each.title.lower()}: {each.lines[-1]}." for each in warnings)
-    return {"question": question, "answer": answer, "label": label, "tone": tone, "caution": caution}
+    """An answer with its question in plain words, as a persona's card shows it. `caution` is what a yes to RQ2 does not
+    say: the key figures that warn; empty if none does."""
+    warnings = [each for each in figures if each.warns and answer.tone == "mended"]
+    caution = " ".join(f"But {each.title.lower()}: {each.lines[-1]}." for each in warnings)
+    return {"question": question, "answer": answer, "caution": caution}

@@ -36,7 +36,7 @@ FINISHED = ("done", "settled")
 """Statuses of a stage that is complete."""
 QUESTIONS = {
     "RQ1": "Does this {person} cause failures?",
-    "RQ2": "Did {doing} fix it?",
+    "RQ2": "Does {doing} help?",
 }
 
 

@@ -16,7 +16,7 @@ import pandas as pd
 import pytest
 
 from harness.evaluation.encounters import Encounter
-from harness.evaluation.metrics import accepted_gap_s, min_pet_s, pet_priority
+from harness.evaluation.metrics import accepted_gap_s
 from harness.evaluation.recorded_game import BodyKind
 from harness.evaluation.rule_book.course import Course
 from harness.evaluation.rule_book.named_manoeuvres import find_manoeuvres
@@ -78,14 +78,13 @@ def series(encounters: list[Encounter]) -> Any:
     return SimpleNamespace(encounters=tuple(encounters))
 
 
-# --- passages and post-encroachment time -----------------------------------------------------------------------------
+# --- passages --------------------------------------------------------------------------------------------------------
 
 
-def test_encounter__passages_of_both_sides_and_the_time_between_them(world: World) -> None:
+def test_encounter__passages_of_both_sides(world: World) -> None:
     (found,) = met(world, ego(), northbound(-44.3))
     assert found.own == pytest.approx(((98.5 - 70.0) / 10.0, (101.5 + 2.3 - 67.7) / 10.0))
     assert found.other == pytest.approx(((-3.0 - (-42.0)) / 10.0, (44.3 + 2.3) / 10.0))
-    assert found.post_encroachment_s == pytest.approx(3.9 - 3.61)
 
 
 @pytest.mark.parametrize(
@@ -98,15 +97,14 @@ def test_encounter__passages_of_both_sides_and_the_time_between_them(world: Worl
     ],
 )
 def test_encounter__time_between_the_passages(cars: list[pd.DataFrame], times_s: list[float], world: World) -> None:
-    assert [each.post_encroachment_s for each in met(world, *cars)] == pytest.approx(times_s)
+    found = [sorted((each.own, each.other)) for each in met(world, *cars)]
+    assert [max(second.enters_s - first.leaves_s, 0.0) for first, second in found] == pytest.approx(times_s)
 
 
 def test_encounter__a_body_that_stops_before_the_zone_is_not_passed(world: World) -> None:
     speeds = np.where(np.arange(STEPS) < 20, 10.0, 0.0)
     (found,) = met(world, ego(), northbound(-34.0, speed_mps=np.maximum(speeds, 0.5)))
     assert found.other is None
-    assert found.post_encroachment_s == np.inf
-    assert min_pet_s(series([found])) is None
 
 
 def test_encounter__none_with_a_body_that_leaves_the_stream_before_the_zone(world: World) -> None:
@@ -126,12 +124,12 @@ def test_encounter__with_background_traffic(world: World) -> None:
 
 def test_metrics__priority_and_accepted_gap(world: World, merge: OpenScene) -> None:
     drive = series(met(world, ego(), northbound(-44.3)))
-    assert pet_priority(drive) == "other"
+    assert [each.must_yield for each in drive.encounters] == [True]
     # the ego enters in 2.85 s; in the first step after that, 2.9 s, the other's front is 10 m before the zone
     assert accepted_gap_s(drive) == pytest.approx(1.0)
     major = with_conflicts(merge.world, {**CROSSING, "yields": False})
     drive = series(met(major, ego(), northbound(-44.3)))
-    assert pet_priority(drive) == "ego"
+    assert [each.must_yield for each in drive.encounters] == [False]
     assert accepted_gap_s(drive) is None
 
 

@@ -47,8 +47,6 @@ def test_metrics__by_hand() -> None:
         "red_lights": 2.0,
         "latest_red_s": 2.5,
         "wrong_way_s": 1.5,
-        "min_pet_s": None,  # without an encounter
-        "pet_priority": None,
         "accepted_gap_s": None,
         "payoff": 4.75,
         "shield_interventions_per_km": None,  # without a shield

@@ -11,7 +11,6 @@ from harness.evaluation.tables import table_of
 from harness.reports.key_figures import (
     HARM_TO_OTHERS,
     NEAR_MISSES,
-    PARTLY,
     PRICE,
     WORST_KNOWN_OPPONENT,
     card_verdict,
@@ -76,11 +75,12 @@ def test_preventable__is_what_the_driver_of_the_regulation_prevents_over_all_see
     ]
 
 
-@pytest.mark.parametrize(("share", "label", "tone"), [(0.95, PARTLY, "open"), (0.0, "Yes", "mended")])
-def test_verdict__an_ego_that_comes_too_close_is_mended_only_in_part(share, label, tone):
+@pytest.mark.parametrize("share", [0.95, 0.0])
+def test_verdict__says_that_an_ego_that_fails_less_comes_too_close(share):
     run = found(campaign(personas=["speedy"]), {"retrained_vs_speedy": share})
-    shown = card_verdict("Did retraining fix it?", answer(run, "RQ2", "speedy"), key_figures("speedy", run))
-    assert (shown["label"], shown["tone"], bool(shown["caution"])) == (label, tone, label == PARTLY)
+    shown = card_verdict("Does retraining help?", answer(run, "RQ2", "speedy"), key_figures("speedy", run))
+    assert shown["answer"].label == "yes"
+    assert shown["caution"].startswith("But near misses: 57 of 60 games of the retrained ego") == (share > 0.0)
 
 
 def harmed(beside_naive, beside_retrained):
@@ -96,7 +96,7 @@ def harmed(beside_naive, beside_retrained):
     return found(recomputed(arguments))
 
 
-def test_harm__that_retraining_leaves_to_others_makes_the_answer_partly():
+def test_harm__that_retraining_leaves_to_others_is_said_beside_the_answer():
     run = harmed(1, 20)
     figure = figures_of(run)[HARM_TO_OTHERS]
     assert figure.lines == [
@@ -105,8 +105,7 @@ def test_harm__that_retraining_leaves_to_others_makes_the_answer_partly():
         "a person fails in 20 of 60 games beside the retrained ego, and in 1 of 60 beside the naive ego",
     ]
     assert figure.warns
-    shown = card_verdict("Did retraining fix it?", answer(run, "RQ2", "speedy"), key_figures("speedy", run))
-    assert (shown["label"], shown["tone"]) == (PARTLY, "open")
+    shown = card_verdict("Does retraining help?", answer(run, "RQ2", "speedy"), key_figures("speedy", run))
     assert shown["caution"] == f"But harm to others: {figure.lines[-1]}."
 
 

@@ -87,9 +87,13 @@ def without_curves(arguments):
 def verdict_texts(arguments):
     """(label, sentence) of every answer on the page, in order."""
     html = without_curves(arguments)
-    found = re.findall(r'class="answer">.*?<span>(.*?)</span>.*?class="sentence">(.*?)</p>', html, flags=re.DOTALL)
-    plain = [[re.sub(r"\s+", " ", part.replace("&#39;", "'").replace("&lt;", "<")) for part in pair] for pair in found]
-    return [(label, sentence.replace("\N{NO-BREAK SPACE}", " ")) for label, sentence in plain]
+    answer = r"<strong>[^<]*\? (.*?)</strong> <span>(.*?)</span>"
+    found = re.findall(rf'class="answer">{answer}.*?class="sentence">(.*?)</p>', html, flags=re.DOTALL)
+    plain = [[re.sub(r"\s+", " ", part.replace("&#39;", "'").replace("&lt;", "<")) for part in parts] for parts in found]
+    return [
+        (f"{question}: {label[0].lower()}{label[1:]}", sentence.replace("\N{NO-BREAK SPACE}", " "))
+        for label, question, sentence in plain
+    ]
 
 
 def not_played():
