@@ -1,6 +1,7 @@
 """The figures of docs/game-on-the-merge.md, from the tables of a run.
 
     python docs/game/figures.py gaps reports/merge-seeds              # best-response gaps
+    python docs/game/figures.py responses reports/merge-robust        # the same, a line for each persona
     python docs/game/figures.py failures reports/merge-arms-race      # failure rates of every ego against every non-ego
     python docs/game/figures.py generalisation reports/merge-arms-race     # egos against non-egos new to them
 
@@ -15,6 +16,8 @@ from typing import Annotated
 
 import pandas as pd
 import typer
+
+from harness.evaluation.gap_verdict import GapVerdict
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, help=__doc__)
 Run = Annotated[Path, typer.Argument(metavar="RUN", help="A run folder, or one of its tables.")]
@@ -51,13 +54,32 @@ def gaps_table(found: pd.DataFrame) -> str:
 
 
 def failures_table(found: pd.DataFrame) -> str:
-    """Failure rates in percent: a row for each ego, a column for each non-ego; the mean over seeds."""
-    rates = found.groupby(["ego", "non_ego"], sort=False)["failure_rate"].mean().unstack()
+    """Failure rates: a row for each ego, a column for each non-ego; the mean over seeds, of several to 0.1 %."""
+    of_pairs = found.groupby(["ego", "non_ego"], sort=False)["failure_rate"]
+    rates, digits = of_pairs.mean().unstack(), int(of_pairs.size().max() > 1)
     egos, non_egos = found["ego"].unique(), found["non_ego"].unique()
     lines = [f"| ego | {' | '.join(f'`{non_ego}`' for non_ego in non_egos)} |", "| --- |" + " ---: |" * len(non_egos)]
     for ego in egos:
-        cells = ["–" if pd.isna(rate) else f"{rate:.0%}" for rate in rates.loc[ego, non_egos]]
+        cells = ["–" if pd.isna(rate) else f"{rate:.{digits}%}" for rate in rates.loc[ego, non_egos]]
         lines.append(f"| `{ego}` | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def responses_table(found: pd.DataFrame) -> str:
+    """A row for each persona: what a best response changes, over all rounds and seeds."""
+    lines = [
+        "| person | the ego fails | against its best response | the person could gain | the ego could gain |",
+        "| --- | ---: | ---: | --- | --- |",
+    ]
+    for persona, rows in found.groupby("persona", sort=False):
+        cells = [f"`{persona}`", f"{rows['ego_failure_rate'].mean():.1%}"]
+        people, egos = rows[rows["role"] == "non_ego"], rows[rows["role"] == "ego"]
+        cells += [f"{people['ego_failure_rate_best_response'].mean():.1%}"]
+        for side in (people, egos):
+            shares = side.loc[side["verdict"] == GapVerdict.DISTINGUISHABLE, "gap_share"].abs()
+            size = f", up to {shares.max():.0%}" if len(shares) else ""
+            cells += [f"in {len(shares)} of {len(side)} pairs{size}"]
+        lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
@@ -88,6 +110,12 @@ def generalisation_table(found: pd.DataFrame) -> str:
 def gaps(run: Run) -> None:
     """Print how much each player could gain by changing its strategy alone."""
     print(gaps_table(read(run, "gaps")))
+
+
+@app.command()
+def responses(run: Run) -> None:
+    """Print what best responses change, a line for each persona."""
+    print(responses_table(read(run, "gaps")))
 
 
 @app.command()
