@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 import typer
 
 from harness.cli import messages
-from harness.cli.documents import check, check_driver, columns, new, persona_app, policy_app, schema
+from harness.cli.documents import campaign_at, check, check_driver, columns, new, persona_app, policy_app, schema
 from harness.cli.falsifying import falsify
 from harness.cli.league import league, league_table
 from harness.cli.output import (
@@ -45,7 +45,6 @@ from harness.errors import (
     short_of_memory,
     without_learners,
 )
-from harness.shipped_documents import document_at
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -138,7 +137,7 @@ def campaign(
     """
     with output(as_json, quiet, verbose) as console:
         _check_address_space()
-        file = document_at(file, "campaigns")
+        file = campaign_at(file)
         with console.status(messages.reading(file)):  # shown before what takes time to import
             from harness.campaign.execution.run_campaign import run_campaign
             from harness.campaign.preflight import open_campaign

@@ -105,24 +105,28 @@ def check(
             if as_json:
                 print_json({"scene": str(folder), "in_order": True, "remarks": lines[1:]})
             return
-        campaign = document_at(file, "campaigns")
-        _check_kind(campaign)
-        _check_campaign(campaign, allow_code, as_json, console)
+        _check_campaign(campaign_at(file), allow_code, as_json, console)
 
 
-def _check_kind(file: Path) -> None:
-    """Raise UsageError if a file is a persona or a driver, which other commands check."""
+def campaign_at(file: Path) -> Path:
+    """The file of a campaign, or of the shipped one of this name. Raises UsageError if it is a document of another
+    kind."""
+    from harness.config.scene import SCENE_FILE
     from harness.config.toml_reading import MOST_BYTES
     from harness.files import content_of
 
+    file = document_at(file, "campaigns")
+    if (folder := folder_of_scene(file)) is not None and (folder / SCENE_FILE).is_file():
+        raise UsageError.of(file, "", "is a scene, not a campaign", f'name it in a campaign: scene = "{folder}"')
     try:
         text = content_of(file, MOST_BYTES).decode(errors="replace")
     except OSError:
-        return  # to read it as a campaign says what is wrong
+        return file  # to read it as a campaign says what is wrong
     if re.search(r"^\[(safety|operational|human)[\].]", text, re.MULTILINE):
         raise UsageError.of(file, "", "is a persona, not a campaign", f"check it with: harness persona check {file}")
     if re.search(r"^kind *=", text, re.MULTILINE):
         raise UsageError.of(file, "", "is a driver, not a campaign", f"check it with: harness check-driver {file}")
+    return file
 
 
 def _check_campaign(file: Path, allow_code: bool, as_json: bool, console: Console) -> None:

@@ -122,17 +122,19 @@ def test_check__lists_the_stages_and_writes_nothing(tmp_path: Path, run_command:
 
 
 @pytest.mark.parametrize(
-    ("file", "kind", "command"),
+    ("given", "file", "kind", "remedy"),
     [
-        ("personas/speedy.toml", "a persona", "harness persona check"),
-        ("egos/adas.toml", "a driver", "harness check-driver"),
+        ("check", "personas/speedy.toml", "a persona", "check it with: harness persona check {path}"),
+        ("campaign", "personas/speedy.toml", "a persona", "check it with: harness persona check {path}"),
+        ("campaign", "egos/adas.toml", "a driver", "check it with: harness check-driver {path}"),
+        ("campaign", "networks/merge", "a scene", 'name it in a campaign: scene = "{path}"'),
     ],
 )
-def test_check__of_another_document_names_its_command(
-    file: str, kind: str, command: str, run_command: Callable[..., Result]
+def test_campaign__that_is_another_document_says_so(
+    given: str, file: str, kind: str, remedy: str, run_command: Callable[..., Result]
 ) -> None:
     path = REPOSITORY / file
-    assert run_command("check", path).err == f"{path}: is {kind}, not a campaign (check it with: {command} {path})\n"
+    assert run_command(given, path).err == f"{path}: is {kind}, not a campaign ({remedy.format(path=path)})\n"
 
 
 def test_report__needs_only_the_folder_even_after_a_move(tmp_path: Path, run_command: Callable[..., Result]) -> None:
