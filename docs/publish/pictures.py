@@ -77,7 +77,7 @@ PUBLISHED = {
     "report": (Picture("report.png", "reports/paper_merge/report.html"),),
     "reading-a-report": (
         Picture("tutorials/card.png", "reports/paper_merge/report.html#persona-1", 1280, 620),
-        Picture("tutorials/player.png", "reports/paper_merge/report.html#game=naive_vs_paper_speedy,11,29", 1280, 760),
+        Picture("tutorials/player.png", "reports/paper_merge/report.html#game=naive_vs_paper_speedy,11,28", 1280, 760),
     ),
 }
 """Pictures of pages in the repository."""
@@ -85,7 +85,7 @@ TUTORIALS = {
     "first-campaign": (Picture("tutorials/first-campaign.png", "lab/reports/lab-quick/report.html"),),
     "your-own-ego": (Picture("tutorials/your-own-ego.png", "reports/my_ego/report.html", 1280, 680),),
     "from-a-failure-to-a-regression-test": (
-        Picture("tutorials/failure.png", "reports/my_ego/report.html#game=naive_vs_paper_speedy,11,5", 1280, 760),
+        Picture("tutorials/failure.png", "reports/my_ego/report.html#game=naive_vs_paper_speedy,11,15", 1280, 760),
     ),
     "your-own-person": (
         Picture("tutorials/late_lee.png", "late_lee.html", 1280, 760),
@@ -99,7 +99,7 @@ TUTORIALS = {
 """Pictures of pages that the steps of a tutorial write."""
 DESKTOPS = {
     "from-a-failure-to-a-regression-test": (
-        Desktop("tutorials/sumo-gui.png", "reports/my_ego", "naive_vs_paper_speedy", 5),
+        Desktop("tutorials/sumo-gui.png", "reports/my_ego", "naive_vs_paper_speedy", 15),
     ),
 }
 """Pictures of SUMO-GUI that a tutorial opens."""
