@@ -67,7 +67,7 @@ def test_report__a_person_that_cannot_drive_is_on_the_first_screen(width, opened
     assert banner.is_visible()
     assert banner.bounding_box()["y"] < 900
     assert contrast(*banner.evaluate(COLOURS)) >= 4.5
-    assert page.get_by_text("Does this driver cause failures? Not answered: the person can't drive this scene").is_visible()
+    assert page.get_by_text("failures? Not answered: the person can't drive this scene").is_visible()
     banner.get_by_role("link", name="learning curves").click()
     assert page.evaluate("location.hash") == "#learning"
     learning = page.locator("#learning")

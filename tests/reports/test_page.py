@@ -89,7 +89,7 @@ def verdict_texts(arguments):
     html = without_curves(arguments)
     answer = r"<strong>[^<]*\? (.*?)</strong> <span>(.*?)</span>"
     found = re.findall(rf'class="answer">{answer}.*?class="sentence">(.*?)</p>', html, flags=re.DOTALL)
-    plain = [[re.sub(r"\s+", " ", part.replace("&#39;", "'").replace("&lt;", "<")) for part in parts] for parts in found]
+    plain = [[re.sub(r"\s+", " ", part.replace("&#39;", "'").replace("&lt;", "<")) for part in each] for each in found]
     return [
         (f"{question}: {label[0].lower()}{label[1:]}", sentence.replace("\N{NO-BREAK SPACE}", " "))
         for label, question, sentence in plain
