@@ -116,6 +116,8 @@ def read_csv(path: Path) -> pd.DataFrame:
     remedy = "run the campaign again: it rewrites its tables"
     try:
         text = _content(path).decode("utf-8")
+        if "\0" in text:
+            raise ValueError("it contains NUL bytes")
         reader = csv.reader(io.StringIO(text, newline=""), strict=True)
         header, lines = next(reader, []), list(reader)
         columns = columns_of(header)
