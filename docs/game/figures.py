@@ -76,7 +76,7 @@ def responses_table(found: pd.DataFrame) -> str:
         people, egos = rows[rows["role"] == "non_ego"], rows[rows["role"] == "ego"]
         cells += [f"{people['ego_failure_rate_best_response'].mean():.1%}"]
         for side in (people, egos):
-            shares = side.loc[side["verdict"] == GapVerdict.DISTINGUISHABLE, "gap_share"].abs()
+            shares = side.loc[side["verdict"] == GapVerdict.DISTINGUISHABLE, "gap_share"]
             size = f", up to {shares.max():.0%}" if len(shares) else ""
             cells += [f"in {len(shares)} of {len(side)} pairs{size}"]
         lines.append(f"| {' | '.join(cells)} |")

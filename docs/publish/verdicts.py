@@ -7,11 +7,13 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from harness.reports.run_tables import QUESTIONS
+
 
 def verdicts_table(result: dict[str, Any]) -> str:
     """A row for each person and question, and how many of the bounds are kept."""
     lines = ["| person | question | answer | games |", "| --- | --- | --- | --- |"]
-    questions = {"RQ1": "Does this person cause failures?", "RQ2": "Does retraining help?"}
+    questions = {name: text.format(person="person", doing="retraining") for name, text in QUESTIONS.items()}
     for each in result["verdicts"]:
         question = f"{questions[each['question']]} ({each['question']})"
         lines.append(f"| {each['persona']} | {question} | {each['label']} | {each['sentence']} |")

@@ -121,7 +121,7 @@ def campaign_at(file: Path) -> Path:
     try:
         text = content_of(file, MOST_BYTES).decode(errors="replace")
     except OSError:
-        return file  # to read it as a campaign says what is wrong
+        return file  # the reader of campaigns says what is wrong
     if re.search(r"^\[(safety|operational|human)[\].]", text, re.MULTILINE):
         raise UsageError.of(file, "", "is a persona, not a campaign", f"check it with: harness persona check {file}")
     if re.search(r"^kind *=", text, re.MULTILINE):

@@ -45,7 +45,7 @@ def test_page__shows_the_output_of_the_script(table: str, source: Path, name: st
 def test_responses__a_line_is_over_all_pairs_of_a_persona() -> None:
     columns = ["persona", "role", "verdict", "gap_share", "ego_failure_rate", "ego_failure_rate_best_response"]
     rows = [
-        ("anna", "ego", GapVerdict.DISTINGUISHABLE, -0.3, 0.1, 0.0),
+        ("anna", "ego", GapVerdict.DISTINGUISHABLE, 0.3, 0.1, 0.0),
         ("anna", "non_ego", GapVerdict.LACKS_POWER, 0.0, 0.1, 0.1),
         ("anna", "ego", GapVerdict.DISTINGUISHABLE, 0.1, 0.2, 0.2),
         ("anna", "non_ego", GapVerdict.NONE_FOUND, 0.0, 0.2, 0.3),
