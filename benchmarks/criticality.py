@@ -27,14 +27,13 @@ def export(run: Path, stage: str, file: Path) -> None:
     import numpy as np
 
     from harness.environments.recorded import recorded_game
-    from harness.evaluation.trace_file import read_traces
+    from harness.evaluation.trace_file import TraceReader
     from harness.road.scene.open_scene import open_scene
 
     scene = open_scene(run / "scene")
-    games = []
-    for episode, trace in read_traces(run / "traces" / f"{stage}.parquet"):
-        if episode >= GAMES:
-            break
+    games, reader = [], TraceReader()
+    for episode in range(GAMES):
+        trace = reader.read(run / "traces" / f"{stage}.parquet", episode)
         game = recorded_game(trace[trace["player"].isin(scene.world.roles)], scene)
         q, kinds = game.quantities, game.body_kinds[: len(scene.world.roles)]
         steps = int(np.flatnonzero(game.drove.all(1))[-1]) + 1

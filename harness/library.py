@@ -63,11 +63,11 @@ class Results:
         `harness columns` describes the columns, as `docs/columns.md` does. Raises UsageError if the run has no such
         game, if the game could not be played, and if the folder does not contain the traces.
         """
-        from harness.campaign.results.replay_game import find_game, read_trace
+        from harness.campaign.results.replay_game import find_game
         from harness.evaluation.trace_file import TraceReader
 
         _, traces = find_game(RunFolder(self.path), arm, episode, seed)
-        return read_trace(traces, episode, TraceReader())
+        return TraceReader().read(traces, episode)
 
     @property
     def episodes(self) -> pd.DataFrame:

@@ -75,20 +75,6 @@ def join_traces(parts: Sequence[Path], path: Path, labels: Mapping[str, str | in
     _write((group for part in parts for group in _row_groups(part)), path, schema.with_metadata(metadata))
 
 
-def read_traces(path: Path) -> Iterator[tuple[int, pd.DataFrame]]:
-    """The games of a file in order, each with its episode. Reads one segment at a time."""
-    rest = SCHEMA.empty_table().to_pandas()
-    for group in _row_groups(path):
-        rows = _with_strings(group.to_pandas())
-        rows = pd.concat((rest, rows)) if len(rest) else rows
-        games = [(int(episode), game) for episode, game in rows.groupby("episode", sort=False)]
-        for episode, game in games[:-1]:
-            yield episode, game.reset_index(drop=True)
-        rest = games[-1][1] if games else rows  # the next row group may continue this game
-    if len(rest):
-        yield int(rest["episode"].iloc[0]), rest.reset_index(drop=True)
-
-
 _Segment = tuple[float, float, pyarrow.dataset.ParquetFileFragment]
 """The lowest and highest episode of a row group, and where it is in its file."""
 
@@ -103,9 +89,10 @@ class TraceReader:
         self._kept: OrderedDict[tuple[str, int], pa.Table] = OrderedDict()
 
     def read(self, path: Path, episode: int) -> pd.DataFrame:
-        """One game's trace; empty if the file has none of that episode.
+        """One game's trace.
 
-        Raises UsageError if it is not a file of traces, or contains values that no game can have.
+        Raises UsageError if it is not a file of traces, contains values that no game can have, or has no trace of that
+        episode.
         """
         try:
             if path not in self._segments:
@@ -114,6 +101,8 @@ class TraceReader:
             tables = [self._table(segment) for low, high, segment in segments if low <= episode <= high]
             rows = pa.concat_tables(tables or [SCHEMA.empty_table()])
             rows = rows.filter(pyarrow.compute.equal(rows["episode"], episode))
+            if not len(rows):
+                raise ValueError(f"it has no trace of episode {episode}")
             frame = rows.unify_dictionaries().to_pandas()
             _check_game(frame)
         except (OSError, ValueError, MemoryError, pa.ArrowException) as error:
@@ -167,22 +156,6 @@ def _with_strings(frame: pd.DataFrame) -> pd.DataFrame:
     return frame
 
 
-def check_traces(path: Path, episodes: Iterable[int]) -> None:
-    """Raise UsageError unless this is a file of traces with plausible numbers and all these episodes."""
-    missing = set(episodes)
-    try:
-        check_file(path, _MOST_BYTES)
-        with pq.ParquetFile(path) as file:
-            _check_schema(file.schema_arrow)
-            for batch in file.iter_batches(columns=["episode", *_NUMBERS]):
-                _check_numbers(np.stack([batch.column(name).to_numpy(False) for name in _NUMBERS]))
-                missing.difference_update(np.unique(batch.column("episode").to_numpy(False)).tolist())
-    except (OSError, ValueError, MemoryError, pa.ArrowException) as error:
-        raise _damaged(path, error) from None
-    if missing:
-        raise _damaged(path, ValueError(f"it has no trace of episode {min(missing)}"))
-
-
 def _check_schema(schema: pa.Schema) -> None:
     if not any(map(schema.equals, _SCHEMAS)):
         different = sorted(set(schema.names) ^ set(SCHEMA.names)) or ["types"]
@@ -192,7 +165,7 @@ def _check_schema(schema: pa.Schema) -> None:
 def _check_game(frame: pd.DataFrame) -> None:
     _check_numbers(frame[_NUMBERS].to_numpy(float))
     steps = frame["step"]
-    if frame.isna().any(axis=None) or (len(frame) and not (0 <= steps.min() <= steps.max() <= _MOST_STEPS)):
+    if frame.isna().any(axis=None) or not (0 <= steps.min() <= steps.max() <= _MOST_STEPS):
         raise ValueError("it has empty cells, or steps out of range")
     if frame.duplicated(["step", "player"]).any():
         raise ValueError("a road user has two rows in one step")

@@ -10,6 +10,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
+from harness.errors import UsageError
 from harness.evaluation import trace_file
 from harness.evaluation.trace_file import SCHEMA, TraceReader, join_traces, trace_writer
 from tests.support.traces import along, rows
@@ -40,11 +41,10 @@ def test_trace__is_read_back_unchanged(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("games", [[game(0)], []])
-def test_trace__an_episode_that_is_not_there_is_empty(games: list[dict[str, list[Any]]], tmp_path: Path) -> None:
+def test_trace__an_episode_that_is_not_there_is_refused(games: list[dict[str, list[Any]]], tmp_path: Path) -> None:
     write(tmp_path / "t.parquet", *games)
-    trace = TraceReader().read(tmp_path / "t.parquet", 7)
-    assert trace.empty
-    assert list(trace.columns) == SCHEMA.names
+    with pytest.raises(UsageError, match="no trace of episode 7"):
+        TraceReader().read(tmp_path / "t.parquet", 7)
 
 
 @pytest.mark.parametrize("most_rows", [4, 1_000])
@@ -55,7 +55,7 @@ def test_reader__keeps_segments_unchanged(most_rows: int, tmp_path: Path, monkey
     write(parts[1], game(2, steps=4), game(3))
     join_traces(parts, arm, {"arm": "naive_alone", "seed": 1})
     reader = TraceReader()
-    for episode in (3, 0, 1, 7, 2, 3):
+    for episode in (3, 0, 1, 2, 3):
         found = reader.read(arm, episode)
         pd.testing.assert_frame_equal(found, TraceReader().read(arm, episode))
         found["x_m"] = 0.0  # a caller may change its copy

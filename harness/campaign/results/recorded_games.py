@@ -52,8 +52,7 @@ def recorded_games(
     reader = TraceReader()
     for game in watching_order(episodes, arms, examples).itertuples():
         trace = reader.read(traces(game.arm, game.seed), game.episode)
-        if not trace.empty:
-            yield tracks_of(trace, scene, game, takeovers.get((game.arm, game.seed, game.episode)))
+        yield tracks_of(trace, scene, game, takeovers.get((game.arm, game.seed, game.episode)))
 
 
 def failing_paths(
@@ -65,8 +64,7 @@ def failing_paths(
     reader = TraceReader()
     for game in worst_first(failed).groupby("arm", sort=False).head(MOST_PATHS).itertuples():
         trace = reader.read(traces(game.arm, game.seed), game.episode)
-        if not trace.empty:
-            yield path_of(trace, scene, game)
+        yield path_of(trace, scene, game)
 
 
 def path_of(trace: pd.DataFrame, scene: OpenScene, game: Any) -> FailingPath:

@@ -177,15 +177,7 @@ def find_game(folder: RunFolder, arm: str, episode: int, seed: int | None) -> tu
 
 def read_game(record: Any, traces: Path, reader: TraceReader, scene: OpenScene) -> PlayedGame:
     """The game of a row of `episodes.csv`. Raises UsageError if its traces lack it."""
-    return PlayedGame(record=record, trace=read_trace(traces, int(record.episode), reader), scene=scene)
-
-
-def read_trace(traces: Path, episode: int, reader: TraceReader) -> pd.DataFrame:
-    """The trace of a game. Raises UsageError if the file lacks it."""
-    trace = reader.read(traces, episode)
-    if trace.empty:
-        raise UsageError.of(traces, "", f"has no trace of episode {episode}", "run the campaign again")
-    return trace
+    return PlayedGame(record=record, trace=reader.read(traces, int(record.episode)), scene=scene)
 
 
 def traces_of(folder: RunFolder, arm: str, seed: int, episode: int) -> Path:

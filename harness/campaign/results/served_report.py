@@ -15,7 +15,7 @@ import pandas as pd
 
 from harness.campaign.results.read_run import episodes_of
 from harness.campaign.results.recorded_games import takeovers_of, tracks_of
-from harness.campaign.results.replay_game import read_trace, traces_of
+from harness.campaign.results.replay_game import traces_of
 from harness.campaign.storage.run_folder import TAKEN_OVER, RunFolder
 from harness.errors import UsageError
 from harness.evaluation.people import judged
@@ -69,7 +69,7 @@ class ServedReport:
     def _recorded(self, game: Any) -> bytes:
         with self._lock:  # the reader keeps one file open
             traces = traces_of(self._folder, game.arm, game.seed, game.episode)
-            trace = read_trace(traces, game.episode, self._reader)
+            trace = self._reader.read(traces, game.episode)
         tracks = tracks_of(trace, self._scene, game, self._takeovers.get((game.arm, game.seed, game.episode)))
         return game_text(tracks, self._marks, self._causes, self._crowds).encode()
 

@@ -28,7 +28,7 @@ from harness.evaluation.rule_book.causes import cause_of
 from harness.evaluation.rule_book.course import Course
 from harness.evaluation.rule_book.named_manoeuvres import find_manoeuvres
 from harness.evaluation.tables import read_csv, table_of, write_csv
-from harness.evaluation.trace_file import read_traces
+from harness.evaluation.trace_file import TraceReader
 from harness.road.scene.open_scene import OpenScene, open_scene
 
 PLAYED = "played.csv"
@@ -72,21 +72,21 @@ def _key(folder: RunFolder, stage: str) -> str:
 
 def _made(folder: RunFolder, stage: str, scene: OpenScene) -> ArmTables:
     played = read_csv(folder.work(stage) / PLAYED)
-    games = {int(row["episode"]): row for row in played.to_dict("records")}
+    episodes, reader = list[Mapping[str, Any]](), TraceReader()
     causes, manoeuvres, conduct = (list[Mapping[str, Any]]() for _ in range(3))
-    for episode, trace in read_traces(folder.traces(stage)) if not (played["error"] != "").all() else ():
-        row = games.get(episode)
-        if row is None or row["error"]:
+    for row in played.to_dict("records"):
+        if row["error"]:
+            episodes.append(row)
             continue
-        game = recorded_game(trace, scene)
+        game = recorded_game(reader.read(folder.traces(stage), int(row["episode"])), scene)
         course, labels = Course(game=game), {name: row[name] for name in ("arm", "persona", "seed", "episode")}
-        games[episode] = {**row, **measured(game)}
+        episodes.append({**row, **measured(game)})
         manoeuvres += [labels | each for each in find_manoeuvres(course)]
         conduct += [labels | each for each in conduct_of(game)]
         if (cause := cause_of(course)) is not None:
             causes.append(labels | {"ego_outcome": row["ego_outcome"]} | cause)
     return ArmTables(
-        episodes=table_of("episodes", games.values(), len(people_in(played.columns))),
+        episodes=table_of("episodes", episodes, len(people_in(played.columns))),
         causes=table_of("causes", causes),
         manoeuvres=table_of("manoeuvres", manoeuvres),
         conduct=table_of("conduct", conduct),
