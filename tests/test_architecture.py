@@ -62,7 +62,9 @@ ROOMS: dict[str, set[str]] = {
     | {"road.scene", "drivers", "assessment", "reports", "training"}
     | EVALUATION
     | CAMPAIGN,
-    "cli": GROUND | {"road.net", "road.scene", "maps", "drivers", "assessment", "export", "reports"} | CAMPAIGN,
+    "cli": GROUND  # of evaluation: the planned tests, and tables
+    | {"road.net", "road.scene", "maps", "drivers", "assessment", "evaluation", "export", "reports"}
+    | CAMPAIGN,
     "library": GROUND | {"drivers"} | EVALUATION | CAMPAIGN,
     "__main__": {"cli"},
     "harness": GROUND | {"road.scene", "drivers", "environments", "library"},

@@ -131,10 +131,11 @@ def campaign_at(file: Path) -> Path:
 
 def _check_campaign(file: Path, allow_code: bool, as_json: bool, console: Console) -> None:
     from harness.campaign.execution.repeat_check import varying_drivers
-    from harness.campaign.plan.paper_rounds import family_lines, family_records, planned_families
+    from harness.campaign.plan.paper_rounds import family_lines, family_records, questions
     from harness.campaign.plan.persona_remarks import ego_persona_remarks, persona_remarks
     from harness.campaign.preflight import open_campaign
     from harness.config.campaign import LEARNED
+    from harness.evaluation.planned_tests import families
 
     opened = open_campaign(file, allow_code=allow_code)
     varying = varying_drivers(opened)
@@ -147,7 +148,7 @@ def _check_campaign(file: Path, allow_code: bool, as_json: bool, console: Consol
     remarks = [*opened.scene.warnings, *unsuited, *ego_persona_remarks(opened.ego_persona), *ego]
     print_plain([f"{file} is in order.", *remarks], console)
     personas = [each.name for each in opened.personas]
-    planned = planned_families(opened.document, personas, opened.tunable)
+    planned = families(questions(opened.document, personas, opened.tunable))
     print_plain([messages.work(opened, stages), *messages.stage_lines(stages)], console)
     print_plain(family_lines(planned), console)
     if as_json:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from harness.campaign.plan.stages import ConditioningStage, TrainingStage
 from harness.config.campaign import LEARNED, Campaign, ego_called
 from harness.evaluation.competence import AloneBound
 from harness.evaluation.strategies import (
@@ -43,22 +42,18 @@ def alone_bounds(campaign: Campaign, *arms: Arm) -> tuple[AloneBound, ...]:
         for arm in arms
         for strategy in (arm.ego, arm.non_ego)
         if strategy is not None
-        for bound in _bounds(campaign, strategy)
+        for bound in bounds_of(campaign, strategy)
     ]
     return tuple(dict.fromkeys(found))
 
 
-def bounds_of(campaign: Campaign, stage: TrainingStage | ConditioningStage) -> tuple[AloneBound, ...]:
-    """What the player of a policy has to achieve alone; none of a best response, an answer, and several personas.
+def bounds_of(campaign: Campaign, strategy: Strategy) -> Iterator[AloneBound]:
+    """What the player of a strategy has to achieve alone; none of a best response, an answer, and several personas.
 
     A best response is trained in games with its opponent only. It is the answer to one opponent, and not a driver for
     the empty road. An answer of a later round is judged by its selection, and the player that goes on by its arm alone.
     Of several personas that learned together, each is judged by its own policy.
     """
-    return tuple(_bounds(campaign, stage.strategy))
-
-
-def _bounds(campaign: Campaign, strategy: Strategy) -> Iterator[AloneBound]:
     asked = campaign.competence
     match strategy:
         case SumoNonEgo() | OtherEgo() | ShieldedEgo() | ErrorFreeEgo():

@@ -24,7 +24,7 @@ from harness.campaign.plan.stages import AssessmentStage, SearchStage, Stage, Tr
 from harness.campaign.plan.strategy_stages import SeedStages, ego_learns, has_round_2, robust_is_last
 from harness.config.campaign import Campaign
 from harness.evaluation.competence import Question, ResearchQuestion
-from harness.evaluation.planned_tests import Family, families
+from harness.evaluation.planned_tests import Family
 from harness.evaluation.strategies import (
     ATTENTIVE,
     NAIVE_ALONE,
@@ -121,11 +121,6 @@ def questions(campaign: Campaign, personas: Sequence[str], tunable: bool = False
             for question, baseline, treatment in pairs
         ]
     return asked
-
-
-def planned_families(campaign: Campaign, personas: Sequence[str], tunable: bool = False) -> tuple[Family, ...]:
-    """The families of Holm's correction, before any outcome is known; `tunable` as in `plan`."""
-    return families(questions(campaign, personas, tunable))
 
 
 def family_lines(families: Sequence[Family]) -> Iterator[str]:

@@ -42,7 +42,7 @@ def judged(
             continue
         if entry.get("steps") is None:  # it was trained in another run
             continue
-        bounds = bounds_of(campaign, stage)
+        bounds = list(bounds_of(campaign, stage.strategy))
         if bounds and entry.get("failing_roads"):
             found[stage.id]["stopped"] = DID_NOT_LEARN
         reached = [(each, goals.get(stage_id(each.arm, stage.seed))) for each in bounds]

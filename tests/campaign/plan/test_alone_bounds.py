@@ -114,7 +114,7 @@ def test_bounds__every_arm_that_they_name_is_played(changes: dict[str, Any], tun
 def test_trainings__are_judged_by_their_players_arm_alone_except_best_responses_and_answers() -> None:
     document = campaign(**RACE)
     trainings = [each for each in plan(document, ["anna", "bert"]) if isinstance(each, TrainingStage)]
-    bounds = {stage.name: bounds_of(document, stage) for stage in trainings}
+    bounds = {stage.name: list(bounds_of(document, stage.strategy)) for stage in trainings}
     judged = {name: [each.arm for each in found] for name, found in bounds.items() if found}
     assert judged["naive"] == NAIVE
     assert judged["anna"] == ["anna_alone"]

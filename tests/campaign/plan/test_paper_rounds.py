@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from harness.campaign.plan.paper_rounds import planned_families, questions
+from harness.campaign.plan.paper_rounds import questions
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.planned_drivers import Shielded, SumoDriven, Trained, description
 from harness.campaign.plan.stages import AssessmentStage, PreventabilityStage, TrainingStage, plays_with_errors
 from harness.config.traits import PersonTraits
 from harness.drivers.policy_file import write_policy
-from harness.evaluation.planned_tests import About
+from harness.evaluation.planned_tests import About, families
 from harness.evaluation.strategies import ATTENTIVE
 from harness.game.roles import EGO, NON_EGO
 from tests.support.plans import campaign_of, planned, stages_of
@@ -272,7 +272,7 @@ def test_keys__of_judgements_depend_on_their_arms_and_no_others_on_them(tmp_path
 )
 def test_families__are_those_of_the_plan(seeds: list[int], of_pairs: int, over: int) -> None:
     personas = ["anna", "bert", "carl"]
-    found = planned_families(campaign_of(*personas, seeds=seeds), personas)
+    found = families(questions(campaign_of(*personas, seeds=seeds), personas))
     sizes = {About.TRAINED_PAIR: of_pairs, About.TRAININGS: over}
     assert {each.about: len(each.tests) for each in found} == {about: size for about, size in sizes.items() if size}
     for family in found:
@@ -285,6 +285,6 @@ def test_families__are_those_of_the_plan(seeds: list[int], of_pairs: int, over: 
 
 def test_families__of_an_ego_that_does_not_learn_have_its_only_question() -> None:
     campaign = campaign_of("anna", seeds=[1, 2, 3], ego={"driver": "sumo"})
-    pairs, over = planned_families(campaign, ["anna"])
+    pairs, over = families(questions(campaign, ["anna"]))
     assert [(each.question, each.persona, each.seeds) for each in over.tests] == [("RQ1", "anna", (1, 2, 3))]
     assert len(pairs.tests) == 3
