@@ -2,7 +2,6 @@
 
 HarnessError                 any error that the harness raises
 ├── UsageError               an error of the user: printed without a traceback, exit code 2
-├── PlanError                the stages of a campaign can't be carried out in any order
 ├── StageFailed              a training or an assessment could not be finished; the message names the stage
 ├── SimulationError          SUMO refused a command, died or lost a vehicle
 └── DriverError              an external driver died, was late or gave an invalid answer
@@ -91,10 +90,6 @@ def without_learners(needed_by: str) -> UsageError:
     """The error for what can't be done without the extra `training`."""
     message = "needs PyTorch and Stable-Baselines3, which are not installed"
     return UsageError.of(needed_by, "", message, "pip install 'safedriverl-harness[training]'")
-
-
-class PlanError(HarnessError):
-    """A plan that can't be carried out: a stage needs one that is not planned, or needs run in a circle."""
 
 
 class StageFailed(HarnessError):

@@ -172,8 +172,7 @@ def run_stages(
 ) -> None:
     """Carry out every stage that is not finished, each after the stages that it needs.
 
-    Everything that happens is emitted; nothing is raised for a stage that fails. Raises PlanError where the stages
-    can't all be carried out in some order.
+    Everything that happens is emitted; nothing is raised for a stage that fails.
     """
     schedule, crashes, helping = Schedule(stages, finished), Crashes(), _Helping(clock)
     running: dict[str, Stage] = {}

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import pytest
-
 from harness.campaign.execution.schedule import Schedule
-from harness.errors import PlanError
 from tests.support.plans import training_of as stage
 
 
@@ -65,13 +62,3 @@ def test_schedule__what_needs_a_failed_stage_is_skipped_with_the_reason_once() -
     skipped = schedule.fail(taken.id)
     assert skipped == {"b-seed1": ["a-seed1"], "c-seed1": ["a-seed1", "b-seed1"]}
     assert carried_out(schedule) == ["d-seed1"]
-
-
-def test_schedule__a_need_that_is_neither_planned_nor_finished_is_an_error() -> None:
-    with pytest.raises(PlanError, match=r"^b-seed1 needs gone-seed1: neither planned nor finished$"):
-        Schedule([stage("a"), stage("b", "gone")], [])
-
-
-def test_schedule__needs_in_a_circle_are_an_error() -> None:
-    with pytest.raises(PlanError, match=r"in a circle: .*a-seed1"):
-        Schedule([stage("a", "b"), stage("b", "a")], [])
