@@ -6,7 +6,6 @@ import json
 import os
 import re
 import shutil
-import sys
 import textwrap
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -20,17 +19,12 @@ from harness.config.campaign import Campaign, CampaignName
 from harness.config.json_schema import file_of, schema_of, term_in_words, unit_of
 from harness.config.persona import Persona
 from harness.config.scene import Name
-from harness.config.toml_reading import read_document
+from harness.config.toml_reading import parse_toml, read_document
 from harness.errors import Problem, UsageError
 from harness.files import check_new_file, write_atomically
 from harness.game.payoff_terms import FUZZY_QUANTITIES, TERMS
 from harness.reports.page_template import environment_of
 from harness.shipped_documents import shipped
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:  # pragma: no cover
-    import tomli as tomllib
 
 PERSONA = "my_driver"
 SCENE = "merge"
@@ -183,7 +177,7 @@ def check_persona(file: Path) -> Persona:
     word that stands for a text to come.
     """
     persona = read_document(file, Persona)
-    template = Persona.model_validate(tomllib.loads(persona_template("any")))
+    template = Persona.model_validate(parse_toml(persona_template("any")))
     problems = []
     for number, source in enumerate(persona.sources):
         for key, remedy in _EVIDENCE.items():

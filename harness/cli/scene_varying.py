@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import sys
 from collections.abc import Mapping, Sequence
 from math import degrees, radians
 from pathlib import Path
@@ -18,6 +17,7 @@ from harness.assessment.route_trial import check_routes
 from harness.cli import messages
 from harness.cli.new_documents import check_free
 from harness.config.scene import SCENE_FILE
+from harness.config.toml_reading import parse_toml
 from harness.errors import Problem, UsageError
 from harness.files import scratch_beside
 from harness.game.roles import EGO
@@ -26,11 +26,6 @@ from harness.road.net.network import lane_line, read_net
 from harness.road.scene.cartesian_road import route_line_of
 from harness.road.scene.load_check import check_loads
 from harness.road.scene.open_scene import OpenScene, open_scene
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:  # pragma: no cover
-    import tomli as tomllib
 
 _ATTEMPTS = 10
 
@@ -102,8 +97,8 @@ def _write(scene: OpenScene, name: str, variation: RoadVariation, folder: Path) 
     varied = read_net(folder / document.net)
     lengths = {each.getID(): each.getLength() for each in net.getEdges(withInternal=False)}
     stretched = {each: varied.getEdge(each).getLength() / length_m for each, length_m in lengths.items()}
-    with (scene.folder / SCENE_FILE).open("rb") as file_:
-        keys = _varied_keys({**tomllib.load(file_), "name": name}, stretched, warp, variation)
+    table = parse_toml((scene.folder / SCENE_FILE).read_text(encoding="utf-8"))
+    keys = _varied_keys({**table, "name": name}, stretched, warp, variation)
     header = f"# {document.name} on another road: {words_of(variation)}.\n"
     (folder / SCENE_FILE).write_text(header + tomli_w.dumps(keys), encoding="utf-8")
 

@@ -22,6 +22,9 @@ if sys.version_info >= (3, 11):
 else:  # pragma: no cover
     import tomli as tomllib
 
+parse_toml = tomllib.loads
+"""The table in a TOML text, whichever Python this is. Raises tomllib.TOMLDecodeError."""
+
 
 class Document(BaseModel):
     """A frozen record that knows all its keys: an unknown one is an error."""

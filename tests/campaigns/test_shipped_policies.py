@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -11,16 +10,12 @@ import pandas as pd
 import pytest
 
 from harness.campaign.preflight import open_campaign
+from harness.config.toml_reading import tomllib
 from harness.drivers.policy_file import read_policy
 from harness.evaluation.tables import read_csv
 from tests.support import shipped
 from tests.support.shipped import CAMPAIGN, CAMPAIGNS, DEMO, DISTRACTED, PERSONAS, POLICIES, SPEEDY
 from tests.support.tiny import finished
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 EPISODES = 30
 FAILED: dict[str, tuple[float, float]] = {  # arm -> least and greatest share of EPISODES games that the ego fails

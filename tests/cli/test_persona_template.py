@@ -4,7 +4,6 @@ is refused."""
 from __future__ import annotations
 
 import re
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -15,16 +14,11 @@ from harness.campaign.preflight import open_campaign
 from harness.cli.new_documents import check_persona, create_persona, persona_template
 from harness.config.json_schema import schema_of
 from harness.config.persona import AttentionLapses, Perception, Persona
-from harness.config.toml_reading import read_document
+from harness.config.toml_reading import read_document, tomllib
 from harness.errors import UsageError
 from harness.game.payoff_terms import FUZZY_QUANTITIES, TERMS
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import harness, write_campaign
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 
 def with_all_keys() -> dict[str, Any]:

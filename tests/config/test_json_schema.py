@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import json
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,14 +13,10 @@ from jsonschema import Draft202012Validator
 from pydantic import TypeAdapter, ValidationError
 
 from harness.config.json_schema import DIALECT, DOCUMENTS, UNITS, schema_of, schema_text, term_in_words, write_schemas
+from harness.config.toml_reading import tomllib
 from harness.errors import UsageError
 from harness.game.payoff_terms import FUZZY_QUANTITIES, GROUPS, TERMS
 from tests.support.repository import REPOSITORY
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 PUBLISHED = REPOSITORY / "docs" / "schemas"
 SHIPPED = [

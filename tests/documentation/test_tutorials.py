@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import shlex
-import sys
 from pathlib import Path
 
 import pytest
@@ -13,12 +12,8 @@ import typer
 from jsonschema import Draft202012Validator
 
 from harness.cli.app import app
+from harness.config.toml_reading import tomllib
 from tests.support.repository import REPOSITORY
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 TUTORIALS = sorted((REPOSITORY / "docs" / "tutorials").glob("*.md"))
 each_tutorial = pytest.mark.parametrize("page", TUTORIALS, ids=lambda page: page.stem)
