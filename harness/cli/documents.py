@@ -78,12 +78,10 @@ def show_persona(
 
 def new(folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="The new folder.")]) -> None:
     """Make a project: a campaign, a scene and a persona of your own, which run as they are, and a README."""
-    from rich.console import Console
-
     from harness.cli.new_documents import create_project
 
     written = [f"wrote {file}" for file in create_project(folder)]
-    print_plain([*written, f"Next: cd {folder} && harness campaign campaign.toml --quick"], Console())
+    print_plain([*written, f"Next: cd {folder} && harness campaign campaign.toml --quick"], console_of_any_encoding())
 
 
 def check(
@@ -215,13 +213,11 @@ def check_driver(
 
     Plays seeded games twice, then all at once, and tells how long a campaign takes. Exit code 1: it does not conform.
     """
-    from rich.console import Console
-
     from harness.assessment.conformance import check_named
     from harness.cli.driver_pace import pace_lines
 
     findings = check_named(driver, document_at(scene, "networks"), games, allow_code=allow_code)
-    print_plain([*findings.lines(), *pace_lines(findings, driver)], Console())
+    print_plain([*findings.lines(), *pace_lines(findings, driver)], console_of_any_encoding())
     if findings.violations:
         raise typer.Exit(FAILED)
 

@@ -46,9 +46,7 @@ def output(as_json: bool, quiet: bool = False, verbose: bool = False) -> Iterato
 
     During the block a usage error is printed as JSON as well, if that is asked for, and `verbose` shows the run's log.
     """
-    from rich.console import Console
-
-    console = Console(stderr=as_json, quiet=quiet)
+    console = console_of_any_encoding(stderr=as_json, quiet=quiet)
     console.soft_wrap = not console.is_terminal  # a file is searched and compared by lines
     try:
         if quiet and verbose:
@@ -61,13 +59,13 @@ def output(as_json: bool, quiet: bool = False, verbose: bool = False) -> Iterato
         raise
 
 
-def console_of_any_encoding() -> Console:
-    """A console that replaces what the terminal has no character for."""
+def console_of_any_encoding(stderr: bool = False, quiet: bool = False) -> Console:
+    """A console that replaces what the terminal has no character for, as standard error does by itself."""
     from rich.console import Console
 
-    if isinstance(sys.stdout, io.TextIOWrapper):
+    if not stderr and isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")
-    return Console()
+    return Console(stderr=stderr, quiet=quiet)
 
 
 def print_plain(lines: Iterable[str], console: Console, style: str | None = None) -> None:

@@ -10,7 +10,7 @@ import typer
 from rich.markup import escape
 
 from harness.cli import messages
-from harness.cli.output import AllowCode, RunEgo, RunPath, RunSeed, print_plain
+from harness.cli.output import AllowCode, RunEgo, RunPath, RunSeed, console_of_any_encoding, print_plain
 from harness.errors import FAILED, NOT_ACCEPTED, UsageError, plain
 from harness.game.roles import roles_of
 from harness.shipped_documents import document_at
@@ -50,8 +50,6 @@ def minimise(
     The start's positions and speeds are changed towards those of a game that the ego does not fail, by bisection.
     Lapses of attention and background traffic stay as they are. `harness regression` plays pinned games.
     """
-    from rich.console import Console
-
     from harness.campaign.execution.pinned_games import PinnedGames
     from harness.campaign.execution.run_players import RunPlayers
     from harness.campaign.storage.run_folder import RunFolder
@@ -62,7 +60,7 @@ def minimise(
         )
     if all_failures and episode is not None:
         raise UsageError.of("--all", str(episode), "names one game beside --all", "leave out EPISODE or --all")
-    console, folder = Console(), RunFolder(run)
+    console, folder = console_of_any_encoding(), RunFolder(run)
     found = None if policies is None else document_at(policies, "policies")
     pinning = PinnedGames(folder, RunPlayers(folder, found, ego, allow_code), out or folder.pinned)
     if all_failures:
@@ -101,13 +99,11 @@ def regression(
 
     Exit codes: 0 every game passes, 1 a game could not be played, 2 usage error, 3 the ego fails in a game.
     """
-    from rich.console import Console
-
     from harness.campaign.execution.regression import Regression
     from harness.files import check_new_file
     from harness.reports.junit import write_junit
 
-    console = Console()
+    console = console_of_any_encoding()
     if junit is not None:
         check_new_file(junit, "--junit")
     with console.status(messages.reading(folder)):

@@ -13,7 +13,16 @@ from urllib.parse import quote
 import typer
 
 from harness.cli import messages
-from harness.cli.output import AsJson, RunPath, RunSeed, output, print_json, print_plain, say_unchecked
+from harness.cli.output import (
+    AsJson,
+    RunPath,
+    RunSeed,
+    console_of_any_encoding,
+    output,
+    print_json,
+    print_plain,
+    say_unchecked,
+)
 from harness.errors import UsageError, plain
 
 if TYPE_CHECKING:
@@ -101,15 +110,13 @@ def export(
     `harness export reports/demo naive_vs_paper_speedy 3 --openscenario --opendrive game` writes one game,
     `harness export reports/demo --failures failures` all failures.
     """
-    from rich.console import Console
-
     from harness.campaign.results.export_games import export_failures, export_game
     from harness.export.folder import Formats
 
     if not (openscenario or opendrive or csv):
         openscenario = opendrive = True
     formats = Formats(openscenario=openscenario, opendrive=opendrive, csv=csv)
-    console, folder = Console(), Path(rest[-1])
+    console, folder = console_of_any_encoding(), Path(rest[-1])
     if failures:
         if len(rest) > 2:
             message, remedy = "is more than an arm and a new folder", "harness export RUN [ARM] --failures DIR"
@@ -146,12 +153,10 @@ def serve(
     """
     import webbrowser
 
-    from rich.console import Console
-
     from harness.campaign.results.served_report import server_of
     from harness.campaign.results.served_runs import served
 
-    console = Console()
+    console = console_of_any_encoding()
     with console.status(messages.reading(run)):
         answer = served(run).answer
     try:
@@ -207,14 +212,12 @@ def compare(
     Failures, near misses, harm to others and speed of every arm that both have; the failures over all runs; and which
     of them were fixed, are new or came back.
     """
-    from rich.console import Console
-
     from harness.campaign.results.compare_runs import compare_runs
     from harness.files import check_new_file, write_atomically
     from harness.reports import comparison_terminal as terminal
     from harness.reports.comparison_page import BETTER, WORSE
 
-    console, page = Console(), out or folders[-1] / "compare.html"
+    console, page = console_of_any_encoding(), out or folders[-1] / "compare.html"
     check_new_file(page)
     comparison = compare_runs(folders, [_address(each, page) for each in folders])
     write_atomically(page, comparison.page().encode())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
 import shutil
 from pathlib import Path
@@ -138,3 +139,20 @@ def test_log__tells_of_each_stage() -> None:
         assert sum(f"started  {stage}" in line for line in lines) == 1
         assert sum(f"done     {stage}:" in line for line in lines) == 1
     assert "ended after" in lines[-1]
+
+
+# --- a terminal without a character -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("command", [["new", "FOLDER"], ["check", "FOLDER"], ["runs", "FOLDER"]])
+def test_command__replaces_what_the_terminal_has_no_character_for(tmp_path: Path, command: list[str]) -> None:
+    folder = tmp_path / "\N{GREEK SMALL LETTER MU}" / "mine"
+    folder.parent.mkdir()
+    if command[0] == "check":
+        shutil.copytree(PAPER_MERGE, folder)
+    if command[0] == "runs":
+        folder.mkdir()
+    words = [str(folder) if word == "FOLDER" else word for word in command]
+    said = harness(*words, env={**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"})
+    assert (said.returncode, said.stderr) == (0, "")
+    assert "?/mine" in said.stdout
