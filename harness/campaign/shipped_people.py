@@ -8,10 +8,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from harness.campaign.trained_policies import learned_by_another
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.mixture import Member
-from harness.drivers.policy_file import LearnedDriver, Policy, persona_hash, policy_files, read_card, read_policy
+from harness.drivers.policy_file import LearnedDriver, Policy, policy_files, read_card, read_policy
 from harness.drivers.policy_of_many import as_persona, personas_in, read_policy_of_many
 from harness.errors import UsageError
 from harness.game.roles import EGO, ROLES
@@ -93,8 +94,8 @@ class ShippedPerson:
         name = self.persona.name
         several = personas_in(read_card(folder))
         policy = as_persona(read_policy_of_many(folder), name) if several else read_policy(folder)
-        if (several[name] if several else policy.card.get("persona_sha256")) != persona_hash(self.persona):
-            message = f"was learned by {name!r} with another payoff or limits than the shipped {name!r} has"
+        sha256 = several[name] if several else policy.card.get("persona_sha256")
+        if message := learned_by_another(name, sha256, self.persona, "the shipped"):
             raise UsageError.of(folder, "persona_sha256", message, "train it again")
         return policy
 

@@ -27,6 +27,7 @@ from harness.shipped_documents import find_document, shipped_names
 
 DRIVER = "driver.toml"
 """The driver document in the folder of a policy that others trained, or of a search."""
+_ANOTHER = "train it again, or use the persona it was trained with"
 
 
 def find_policies(file: Path, written: str | None, exist: bool = True) -> Path | None:
@@ -124,9 +125,9 @@ def _problems_of(
         yield Problem(str(folder), "stage", message, "give the folder its policy's name")
     name = card.get("persona")
     persona = ego_persona if card.get("player") == ROLES[EGO] else personas.get(str(name))
-    if persona is not None and card.get("persona_sha256") != persona_hash(persona):
-        message = f"was learned by {name!r} with another payoff or limits than the campaign's {persona.name!r} has"
-        yield Problem(str(folder), "persona_sha256", message, "train it again, or use the persona it was trained with")
+    sha256 = card.get("persona_sha256")
+    if persona is not None and (message := learned_by_another(name, sha256, persona, "the campaign's")):
+        yield Problem(str(folder), "persona_sha256", message, _ANOTHER)
 
 
 def _problems_of_many(
@@ -136,9 +137,16 @@ def _problems_of_many(
     for name in names:
         if name not in hashes:
             yield Problem(str(folder), "personas", f"is no policy of {name!r}", nearest(name, list(hashes)))
-        elif hashes[name] != persona_hash(personas[name]):
-            message = f"was learned by {name!r} with another payoff or limits than the campaign's {name!r} has"
-            yield Problem(str(folder), "personas", message, "train it again, or use the persona it was trained with")
+        elif message := learned_by_another(name, hashes[name], personas[name], "the campaign's"):
+            yield Problem(str(folder), "personas", message, _ANOTHER)
+
+
+def learned_by_another(name: object, sha256: object, persona: Persona, whose: str) -> str:
+    """How a policy learned that was learned by a persona of this name and hash, if that is not the persona; empty if it
+    is. `whose` persona this is, in words."""
+    if sha256 == persona_hash(persona):
+        return ""
+    return f"was learned by {name!r} with another payoff or limits than {whose} {persona.name!r} has"
 
 
 def _alternatives(missing: str, available: Iterable[str]) -> str:
