@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import posixpath
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any
 
 from harness.campaign.plan.stages import arms_of
 from harness.campaign.results.read_run import episodes_of
-from harness.campaign.storage.manifest import planned
+from harness.campaign.storage.manifest import digests_read, planned
 from harness.campaign.storage.run_folder import RunFolder
 from harness.errors import UsageError
 from harness.evaluation.comparisons.run_comparison import changed_games, differences_of, failure_rates
@@ -67,10 +66,5 @@ def _labels(folders: Sequence[Path]) -> list[str]:
 
 def _starts(manifest: Mapping[str, Any]) -> tuple[object, ...]:
     """What the starts of a run's games depend on: the scene's files, and the seed from which they are drawn."""
-    scene = posixpath.basename(posixpath.normpath(manifest["campaign"]["scene"]))
-    files = sorted(
-        (posixpath.basename(name), digest)
-        for name, digest in manifest["hashes"].items()
-        if posixpath.basename(posixpath.dirname(name)) == scene
-    )
-    return (*files, manifest["seeds"][0])
+    scene = PurePath(manifest["campaign"]["scene"]).name
+    return (*sorted(digests_read(manifest).get(scene, {}).items()), manifest["seeds"][0])

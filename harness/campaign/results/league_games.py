@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from pathlib import PurePath
 from typing import Any
 
 import pandas as pd
@@ -11,7 +10,7 @@ import pandas as pd
 from harness.campaign.plan.planned_drivers import PlannedMember, Trained, TrainedBefore, members_of
 from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.storage.checksums import checksums_of, digest_of
-from harness.campaign.storage.manifest import campaign_in
+from harness.campaign.storage.manifest import campaign_in, digests_read
 from harness.campaign.storage.run_folder import RunFolder
 from harness.drivers.policy_file import policy_files
 from harness.evaluation.comparisons.tied_ranks import GAME, PLAYER
@@ -38,9 +37,7 @@ def games_sha256(
     """The digest of what the games of each arm depend on beside the ego, by its name and training seed: the same for
     each training seed of the people where no person is trained."""
     scene, start_seed = checksums_of(run.scene, sorted(run.scene.iterdir())), campaign_in(manifest).start_seed
-    read: dict[str, dict[str, str]] = {}
-    for file, sha256 in manifest["hashes"].items():
-        read.setdefault(PurePath(file).parent.name, {})[PurePath(file).name] = sha256
+    read = digests_read(manifest)
 
     def policy(driver: PlannedMember) -> Mapping[str, Any]:
         match driver:

@@ -11,7 +11,7 @@ from harness.campaign.results.drawn_starts import drawn_starts
 from harness.campaign.results.evaluate_run import people_drive, with_acceptance
 from harness.campaign.results.matchups import matchups_of
 from harness.campaign.results.served_report import PAGE
-from harness.campaign.storage.manifest import campaign_in, done_in, is_tuned, planned
+from harness.campaign.storage.manifest import campaign_in, digests_read, done_in, is_tuned, planned
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign
 from harness.evaluation.game_theory.findings import GameFindings, cautions
@@ -77,8 +77,7 @@ def _with_scene(tables: RunTables, campaign: Campaign) -> RunTables:
         return tables
     scene = open_scene(folder)
     tables = replace(tables, non_ego_drives=people_drive(scene))
-    files = {Path(file): digest for file, digest in tables.manifest["hashes"].items()}
-    digests = {file.name: digest for file, digest in files.items() if file.parent.name == folder.name}
+    digests = digests_read(tables.manifest).get(folder.name, {})
     if not (digests and all(has_digest(folder / name, [digest]) for name, digest in digests.items())):
         return tables
     return replace(tables, starts=drawn_starts(scene, campaign.start_seed, tables.episodes["episode"]))

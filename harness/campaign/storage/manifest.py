@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, ValidationError, model_validator
@@ -179,6 +179,14 @@ def done_in(manifest: Mapping[str, Any], kind: str | None = None) -> list[str]:
     """The stages of a run that are done, by id; those of one kind, if it is given."""
     entries = manifest["stages"].items()
     return [name for name, entry in entries if entry["status"] == "done" and kind in (None, entry["kind"])]
+
+
+def digests_read(manifest: Mapping[str, Any]) -> dict[str, dict[str, str]]:
+    """The digest of each file that a run read, by the name of its folder and its own."""
+    digests: dict[str, dict[str, str]] = {}
+    for file, sha256 in manifest["hashes"].items():
+        digests.setdefault(PurePath(file).parent.name, {})[PurePath(file).name] = sha256
+    return digests
 
 
 def traits_in(manifest: Mapping[str, Any]) -> PersonTraits:
