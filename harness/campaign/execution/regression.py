@@ -23,7 +23,7 @@ from harness.drivers.policy_file import LearnedDriver, policy_files, read_policy
 from harness.drivers.protocol import Driver
 from harness.drivers.sumo import SumoDriver
 from harness.errors import Problem, UsageError, collect
-from harness.files import digest_of_file
+from harness.files import has_digest
 from harness.game.roles import EGO
 from harness.road.scene.open_scene import OpenScene, open_scene
 
@@ -103,9 +103,9 @@ class Regression:
 
 
 def _check_scene(file: Path, hashes: Mapping[str, str], scene: OpenScene) -> None:
-    found = {name: _sha256(scene.folder / name) for name in scene.document.files}
-    if found != dict(hashes):
-        changed = sorted(name for name in {*found, *hashes} if found.get(name) != hashes.get(name))
+    files = set(scene.document.files)
+    same = {name for name in files & hashes.keys() if has_digest(scene.folder / name, [hashes[name]])}
+    if changed := sorted((files | hashes.keys()) - same):
         message = f"is not the scene of this game: {', '.join(changed)} differs"
         raise UsageError.of(file, "scene", message, "pin the game again, or restore the scene")
 
@@ -116,14 +116,7 @@ def _person(file: Path, person: PinnedPerson) -> Mixture:
         return mixture_of(SumoDriver(), persona)
     folder = resolve(file, person.policy)
     policy = read_policy(folder)
-    if _sha256(policy_files(folder)[1]) != person.policy_sha256:
+    if not has_digest(policy_files(folder)[1], [person.policy_sha256 or ""]):
         message = f"{person.policy!r} is not the policy of this game"
         raise UsageError.of(file, "people.policy_sha256", message, "pin the game again, or restore the policy")
     return mixture_of(LearnedDriver(policy, persona.decisions == "sampled"), persona)
-
-
-def _sha256(file: Path) -> str:
-    try:
-        return digest_of_file(file)
-    except OSError as error:
-        raise UsageError.of(file, "", str(error.strerror), "restore the file") from None
