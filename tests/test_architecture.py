@@ -53,7 +53,7 @@ ROOMS: dict[str, set[str]] = {
     "campaign.storage": {"errors", "files", "version", "config", "campaign.plan"}
     | EVALUATION
     | {"road.scene", "environments"},
-    "campaign": GROUND | {"road.scene", "drivers", "campaign.plan"},  # preflight
+    "campaign": GROUND | {"road.scene", "drivers", "evaluation", "campaign.plan"},  # preflight; names of strategies
     "campaign.results": GROUND
     | {"road.net", "road.scene", "drivers", "environments", "replay", "export", "reports"}
     | {"campaign.plan", "campaign.storage"}

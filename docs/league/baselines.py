@@ -17,9 +17,9 @@ import pandas as pd
 import typer
 
 from harness.campaign.results.ci_files import RESULT, write_record
-from harness.campaign.results.league_table import in_json, worst_pairings_first
+from harness.campaign.results.league_table import worst_pairings_first
 from harness.evaluation.comparisons.tied_ranks import with_shield
-from harness.evaluation.tables import read_csv, write_csv
+from harness.evaluation.tables import read_csv, rows_in_json, write_csv
 
 RULES = ("sumo", "adas", "careful_and_competent", "fuzzy", "rss")
 SHIELDED = RULES[1:]  # SUMO's driver has no decision that a shield could check
@@ -60,7 +60,7 @@ def replace_scenes(league: Path, part: Path) -> None:
     table, games = worst_pairings_first(tables["league"]), tables["league_games"].sort_values("scene", kind="stable")
     write_csv(table, league / "league.csv")
     write_csv(games, league / "league_games.csv")
-    write_record(league / RESULT, record | {"rows": in_json(table)})
+    write_record(league / RESULT, record | {"rows": rows_in_json(table)})
 
 
 def _run(*words: object) -> None:

@@ -16,10 +16,10 @@ import pandas as pd
 import typer
 from matplotlib.axes import Axes
 
-from harness.campaign.plan.stages import TrainingStage, stage_id
+from harness.campaign.plan.stages import TrainingStage
 from harness.campaign.storage.manifest import planned
 from harness.evaluation.competence import DID_NOT_LEARN
-from harness.evaluation.strategies import NaiveEgo, Strategy, player_of
+from harness.evaluation.strategies import NaiveEgo, Strategy, player_of, stage_id
 from harness.evaluation.tables import read_csv
 from harness.game.roles import EGO
 

@@ -21,7 +21,7 @@ from typing import Any
 import tomli_w
 
 from harness.campaign.preflight import OpenCampaign, open_campaign
-from harness.campaign.shipped_people import SEED, people_of
+from harness.campaign.shipped_people import people_of
 from harness.config.campaign import LEARNED, SUMO
 from harness.config.driver import DriverDocument, Onnx, Process, StableBaselines3, TorchScript
 from harness.config.tunable import Adjustable
@@ -87,7 +87,7 @@ def _campaigns(scene: Path, ego: Mapping[str, str], episodes: int) -> Iterator[M
     if not people:
         yield {"name": scene.name, "personas": [], **shared}
     for number, each in enumerate(people):
-        name = f"{scene.name}{SEED}{'-'.join(map(str, each.seeds))}" if number else scene.name
+        name = f"{scene.name}-seed{'-'.join(map(str, each.seeds))}" if number else scene.name
         own = {"personas": each.personas, "seeds": each.seeds, "policies": str(shipped("policies") / scene.name)}
         how = {"non_ego_training": {"together": True}} if each.together else {}
         yield {"name": name, **own, **how, **shared}

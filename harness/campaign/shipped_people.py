@@ -15,11 +15,9 @@ from harness.drivers.mixture import Member
 from harness.drivers.policy_file import LearnedDriver, Policy, policy_files, read_card, read_policy
 from harness.drivers.policy_of_many import as_persona, personas_in, read_policy_of_many
 from harness.errors import UsageError
+from harness.evaluation.strategies import name_and_seed
 from harness.game.roles import EGO, ROLES
 from harness.shipped_documents import shipped
-
-SEED = "-seed"
-"""Between the name and the training seed of a policy."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,12 +50,12 @@ def _policies(scene: Path) -> Iterator[tuple[str, bool, int, Path]]:
     if scene != shipped("networks").resolve() / scene.name or not folder.is_dir():
         return
     for policy in sorted(folder.iterdir()):
-        name, _, seed = policy.name.rpartition(SEED)
-        if name and seed.isdecimal() and policy.is_dir():
+        name, seed = name_and_seed(policy.name)
+        if seed is not None and policy.is_dir():
             card = read_card(policy)
             several = personas_in(card)
             for person in several or ([name] if card.get("player") != ROLES[EGO] else []):
-                yield person, bool(several), int(seed), policy
+                yield person, bool(several), seed, policy
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -21,6 +21,7 @@ from harness.drivers.policy_file import Policy, check_no_archive, persona_hash, 
 from harness.drivers.policy_of_many import personas_in, read_policy_of_many
 from harness.drivers.policy_origin import other_games
 from harness.errors import Problem, UsageError, collect
+from harness.evaluation.strategies import name_and_seed
 from harness.game.roles import EGO, NON_EGO, ROLES
 from harness.road.scene.open_scene import OpenScene
 from harness.shipped_documents import find_document, shipped_names
@@ -78,7 +79,7 @@ def check_policies(
             of_many.setdefault(stage.of.stage, []).append(stage.persona)
     for name in dict.fromkeys(name for stage in stages for name in stage.reads):
         place = folder / name / DRIVER
-        person = by_name.get(name.rpartition("-seed")[0])
+        person = by_name.get(name_and_seed(name)[0])
         player = EGO if person is None else NON_EGO
         if name not in available:
             message = f"{document.policies!r} holds no policy {name!r}"
@@ -151,8 +152,8 @@ def learned_by_another(name: object, sha256: object, persona: Persona, whose: st
 
 def _alternatives(missing: str, available: Iterable[str]) -> str:
     """A remedy for a missing policy: the seeds that its stage has, or the stages that exist."""
-    stage = missing.rpartition("-seed")[0]
-    parts = [each.rpartition("-seed") for each in available]
-    if seeds := sorted(int(seed) for name, _, seed in parts if name == stage and seed.isdecimal()):
+    stage, _ = name_and_seed(missing)
+    parts = [name_and_seed(each) for each in available]
+    if seeds := sorted(seed for name, seed in parts if name == stage and seed is not None):
         return f"there is {stage!r} of seed {', '.join(map(str, seeds))}"
-    return nearest(stage, {name for name, _, _ in parts if name} or ["(no policy at all)"])
+    return nearest(stage, {name for name, _ in parts if name} or ["(no policy at all)"])

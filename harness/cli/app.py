@@ -208,7 +208,7 @@ def _started_on(ray: str | None, jobs: int | None, warn: Callable[[str], None]) 
         yield partial(RayWorkers, ray=cluster, jobs=jobs, warn=warn)
 
 
-def _end_with(outcome: RunResult, run: Path, console: Console, as_json: bool = False) -> None:
+def _end_with(outcome: RunResult, run: Path, console: Console, as_json: bool) -> None:
     """Say what has come out, and end the command with the exit code of the run.
 
     What failed is said also where the console is quiet. As JSON: the content of `result.json`, the run folder and the

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -41,6 +40,7 @@ def falsify(
         from harness.campaign.execution.run_players import RunPlayers
         from harness.campaign.results.shown_work import progress_bar
         from harness.campaign.storage.run_folder import RunFolder
+        from harness.evaluation.tables import rows_in_json
 
         folder = RunFolder(run)
         manifest = folder.manifest()
@@ -54,7 +54,7 @@ def falsify(
         print_plain(_sentences(found), console)
         print_plain([f"{(out or run) / 'falsification.csv'}"], console)
         if as_json:
-            print_json({"falsification": json.loads(found.to_json(orient="records"))})
+            print_json({"falsification": rows_in_json(found)})
 
 
 def _shown(searches: pd.DataFrame) -> Table:

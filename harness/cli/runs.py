@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shlex
 from collections.abc import Sequence
@@ -257,12 +256,13 @@ def realism(run: RunPath, as_json: AsJson = False) -> None:
     with output(as_json) as console:
         from harness.campaign.results.read_run import result_table
         from harness.campaign.storage.run_folder import RunFolder
+        from harness.evaluation.tables import rows_in_json
         from harness.reports.human_ranges import comparable, headline, human_rows
 
         table = result_table(RunFolder(run), "realism")
         say_unchecked(run, console)
         if as_json:
-            print_json(json.loads(table.to_json(orient="records")))
+            print_json(rows_in_json(table))
             return
         console.print(_beside_people(human_rows(table)))
         left = len(table) - len(comparable(table))

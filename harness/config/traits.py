@@ -13,7 +13,7 @@ from harness.config.persona import Persona
 
 PAYOFF, ATTENTION = "payoff", "attention"
 NO_TRAIT = ("name", "description", "sources", "unlike_people")
-"""The keys that say who the person is, and do not drive."""
+"""The keys that say who the person is, and do not drive: no policy learns by them."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -23,13 +23,13 @@ from safetensors.numpy import save as save_tensors
 
 from harness.config.persona import Persona
 from harness.config.toml_reading import nearest
+from harness.config.traits import NO_TRAIT
 from harness.errors import UsageError
 from harness.files import content_of, make_folder, write_atomically
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.observation_layout import LAYOUT
 
 FORMAT = 1
-_NOT_LEARNED_BY = ("name", "description", "sources", "unlike_people")  # keys of a persona
 ACTIONS = 2
 ARCHIVES = (".zip", ".pkl", ".pickle", ".pt", ".pth", ".ckpt", ".joblib", ".npy", ".npz", ".onnx")
 _MAX_TENSOR_BYTES, _MAX_CARD_BYTES = 100_000_000, 1_000_000
@@ -103,8 +103,8 @@ def write_policy(policy: Policy, folder: Path) -> None:
 
 
 def persona_hash(persona: Persona) -> str:
-    """SHA-256 of what a policy learns by: the persona's document without `_NOT_LEARNED_BY`."""
-    learned_by = {key: value for key, value in persona.record().items() if key not in _NOT_LEARNED_BY}
+    """SHA-256 of what a policy learns by: the persona's document without `NO_TRAIT`."""
+    learned_by = {key: value for key, value in persona.record().items() if key not in NO_TRAIT}
     return hashlib.sha256(json.dumps(learned_by, sort_keys=True).encode()).hexdigest()
 
 

@@ -98,6 +98,8 @@ WITHHELD = frozenset(
 )
 """The verdicts on players about which a question is not answered."""
 
+FINISHED = ("done", "settled")
+"""Statuses of a finished stage; `settled`: an approximate equilibrium or a taken answer left nothing to do."""
 DID_NOT_LEARN = "did not learn"
 """How a training ended whose player misses one of its bounds, whatever stopped it."""
 RULES: Mapping[str, tuple[str, str, float]] = {

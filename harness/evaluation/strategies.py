@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from harness.game.roles import EGO, NON_EGO, ROLES
 
+_SEED = "-seed"
 PAPER_ROUNDS = 2
 """The rounds of the paper: strategies of later rounds carry their round in their name."""
 
@@ -223,6 +224,17 @@ def is_named_of_the_naive_ego(arm: str) -> bool:
     naive, answers = strategy_name(NaiveEgo()), [f"_{role}_response" for role in ROLES]
     is_of_response = arm.endswith(answers[EGO]) and not arm.endswith(answers[NON_EGO])
     return arm.startswith((NAIVE_ALONE.name, f"{naive}_vs_")) and not is_of_response
+
+
+def stage_id(name: str, seed: int) -> str:
+    """What a stage is called in a run folder, by the name of its strategy or arm and its training seed."""
+    return f"{name}{_SEED}{seed}"
+
+
+def name_and_seed(stage: str) -> tuple[str, int | None]:
+    """The name and the training seed of a stage's id; of any other text, no name and no seed."""
+    name, _, seed = stage.rpartition(_SEED)
+    return (name, int(seed)) if name and seed.isdecimal() else ("", None)
 
 
 def player_of(strategy: Strategy) -> int:

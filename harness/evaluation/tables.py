@@ -10,6 +10,7 @@ from __future__ import annotations
 import csv
 import gzip
 import io
+import math
 import zlib
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -130,6 +131,12 @@ def read_csv(path: Path) -> pd.DataFrame:
         raise UsageError.of(path, "", f"can't be read: {error.strerror}", remedy) from error
     except (ValueError, OverflowError, EOFError, zlib.error, csv.Error) as error:
         raise UsageError.of(path, "", f"is not a table of this harness: {error}", remedy) from error
+
+
+def rows_in_json(table: pd.DataFrame) -> list[dict[str, Any]]:
+    """The rows of a table as JSON can have them: null where a cell is empty or infinite."""
+    written = table.astype(object).where(table.notna() & ~table.isin([math.inf, -math.inf]), None)
+    return [{str(name): cell for name, cell in row.items()} for row in written.to_dict("records")]
 
 
 def _content(path: Path) -> bytes:

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from harness.evaluation.people import judged_outcomes
+from harness.evaluation.strategies import stage_id
 from harness.game.outcome import Outcome
 
 FAILURES = (Outcome.COLLISION.word, Outcome.RAIL.word, Outcome.TIMEOUT.word)
@@ -28,7 +29,7 @@ def worst_first(episodes: pd.DataFrame) -> pd.DataFrame:
 
 def replay_name(arm: str, seed: int, episode: int) -> str:
     """The folder's name under `replays/`."""
-    return f"{arm}-seed{seed}-{episode:03d}"
+    return f"{stage_id(arm, seed)}-{episode:03d}"
 
 
 def choose_games(episodes: pd.DataFrame) -> pd.DataFrame:

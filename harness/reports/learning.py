@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from harness.config.training import ATTENTIVE_SHARE, Training
 from harness.evaluation.competence import ALONE, DID_NOT_LEARN
-from harness.evaluation.strategies import ManyPersonas, NaiveEgo, PersonaNonEgo, Strategy, player_of
+from harness.evaluation.strategies import ManyPersonas, NaiveEgo, PersonaNonEgo, Strategy, player_of, stage_id
 from harness.game.roles import EGO
 from harness.reports.figures import INK, SERIES, figure_of, svg
 from harness.reports.numbers import MISSING, number, percent, short, steps_text, trimmed
@@ -25,7 +25,7 @@ def learning(tables: RunTables) -> list[dict[str, Any]]:
     training, found = tables.training, []
     for place, stage in enumerate(training["stage"].unique(), 1):
         rows = training[training["stage"] == stage]
-        entries = {seed: tables.stages.get(f"{stage}-seed{seed}", {}) for seed in sorted(rows["seed"].unique())}
+        entries = {seed: tables.stages.get(stage_id(str(stage), seed), {}) for seed in sorted(rows["seed"].unique())}
         events = {seed: _events(str(stage), entry, tables) for seed, entry in entries.items()}
         stops = {
             seed: f"{entry['steps']:,} steps ({stopped(entry)})"
@@ -183,7 +183,7 @@ def searches(reconfiguration: pd.DataFrame) -> list[dict[str, Any]]:
                 "figure": _figure(trials, f"search{place}", alternative),
                 "summary": summary,
                 "parameters": both.to_dict("records"),
-                "document": f"policies/{stage}-seed{seed}/driver.toml",
+                "document": f"policies/{stage_id(str(stage), seed)}/driver.toml",
             }
         )
     return found

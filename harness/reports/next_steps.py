@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from harness.config.training import Training
 from harness.evaluation.competence import DID_NOT_LEARN
-from harness.evaluation.strategies import strategy_name
+from harness.evaluation.strategies import stage_id, strategy_name
 from harness.evaluation.worst_first import worst_first
 from harness.reports.embedding import key
 from harness.reports.focus import Focus, focus_of
@@ -43,7 +43,7 @@ def _has_learned(focus: Focus | None, tables: RunTables) -> bool:
         return False
     arm = tables.arms[focus.arm]
     players = [strategy_name(each) for each in (arm.ego, arm.non_ego) if each is not None]
-    entries = [tables.stages.get(f"{player}-seed{seed}", {}) for player in players for seed in tables.seeds]
+    entries = [tables.stages.get(stage_id(player, seed), {}) for player in players for seed in tables.seeds]
     return all(each.get("stopped") != DID_NOT_LEARN for each in entries)
 
 

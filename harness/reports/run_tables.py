@@ -12,6 +12,7 @@ import pandas as pd
 from harness.config.campaign import LEARNED, ego_called
 from harness.evaluation.comparisons.acceptance_checks import Check
 from harness.evaluation.comparisons.preventability import by_regulation, sentences_of
+from harness.evaluation.competence import FINISHED
 from harness.evaluation.game_theory.findings import GameFindings
 from harness.evaluation.rule_book.causes import cause_lines
 from harness.evaluation.start_space import Boundary
@@ -27,13 +28,12 @@ from harness.evaluation.strategies import (
     Strategy,
     against_persona,
     round_of,
+    stage_id,
 )
 from harness.evaluation.tables import table_of
 
 Row = Mapping[Any, Any]
 """A row of a table, by column."""
-FINISHED = ("done", "settled")
-"""Statuses of a stage that is complete."""
 QUESTIONS = {
     "RQ1": "Does this {person} cause failures?",
     "RQ2": "Does {doing} help?",
@@ -239,7 +239,7 @@ class RunTables:
         """The training seeds of which a question is asked: its treatment is planned, or it is compared."""
         _, treatment = self.arms_of(question, persona)
         compared = {row["seed"] for row in self.tests_of(question, persona)}
-        return [seed for seed in self.seeds if f"{treatment}-seed{seed}" in self.stages or seed in compared]
+        return [seed for seed in self.seeds if stage_id(treatment, seed) in self.stages or seed in compared]
 
     def of_own_traits(self, rows: pd.DataFrame) -> pd.DataFrame:
         """The rows of a table in whose arms people have their own traits."""

@@ -20,9 +20,11 @@ from harness.evaluation.strategies import (
     SumoNonEgo,
     is_named_of_a_trait,
     is_named_of_the_naive_ego,
+    name_and_seed,
     persona_alone,
     player_of,
     round_of,
+    stage_id,
     strategy_name,
 )
 from harness.game.roles import EGO, NON_EGO
@@ -102,3 +104,13 @@ def test_arm__a_best_response_belongs_to_its_pair() -> None:
 def test_name_of_an_arm__says_what_the_arm_does(arm: Arm, persona: str, of_a_trait: bool, of_the_naive: bool) -> None:
     assert is_named_of_a_trait(arm.name, persona) == arm.is_of_a_trait == of_a_trait
     assert is_named_of_the_naive_ego(arm.name) == of_the_naive
+
+
+@pytest.mark.parametrize("name", ["naive", "retrained_speedy_round4", "on-seeds"])
+def test_stage_id__is_read_as_it_is_derived(name: str) -> None:
+    assert name_and_seed(stage_id(name, 11)) == (name, 11)
+
+
+@pytest.mark.parametrize("text", ["", "naive", "-seed1", "naive-seed", "naive-seed1b", "naive-seed-1"])
+def test_stage_id__other_text_has_no_name_and_no_seed(text: str) -> None:
+    assert name_and_seed(text) == ("", None)

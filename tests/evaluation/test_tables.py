@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import gzip
+import json
 import math
 
 import pandas as pd
@@ -12,7 +13,7 @@ from scipy import stats
 from harness.errors import UsageError
 from harness.evaluation.columns import TABLES
 from harness.evaluation.comparisons.summary import summarise
-from harness.evaluation.tables import joined, read_csv, table_of, typed, write_csv
+from harness.evaluation.tables import joined, read_csv, rows_in_json, table_of, typed, write_csv
 
 WHOLE = st.integers(-(2**62), 2**62)
 CELLS = {
@@ -232,3 +233,11 @@ def test_read_csv__another_file_is_a_usage_error_that_names_it(tmp_path, text):
         path.write_text(text)
     with pytest.raises(UsageError, match=r"training\.csv"):
         read_csv(path)
+
+
+def test_rows_in_json__empty_and_infinite_cells_are_null() -> None:
+    table = pd.DataFrame({"arm": ["a", ""], "games": [3, 4], "rate": [0.1, math.nan], "worst": [-math.inf, 1.0]})
+    table["left"] = pd.array([None, 2], dtype="Int64")
+    first, second = json.loads(json.dumps(rows_in_json(table), allow_nan=False))
+    assert first == {"arm": "a", "games": 3, "rate": 0.1, "worst": None, "left": None}
+    assert second == {"arm": "", "games": 4, "rate": None, "worst": 1.0, "left": 2}

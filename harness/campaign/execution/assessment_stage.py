@@ -23,13 +23,14 @@ from harness.assessment.rollout import Game, assess_batches, plays_side_by_side
 from harness.assessment.seated_arm import SeatedArm
 from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import SEGMENT_EPISODES, StageRun
-from harness.campaign.plan.stages import AssessmentStage, stage_id
+from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.storage.arm_tables import PLAYED, arm_tables
 from harness.campaign.storage.checksums import intact_record, write_checksums
 from harness.campaign.storage.locks import InUse, held_by_worker
 from harness.campaign.storage.versions import versions_of_numbers
 from harness.errors import StageFailed
 from harness.evaluation.competence import goals_alone
+from harness.evaluation.strategies import stage_id
 from harness.evaluation.tables import joined, read_csv, table_of, write_csv
 from harness.evaluation.trace_file import join_traces, trace_writer
 from harness.evaluation.unplayed_games import reason_of

@@ -17,10 +17,8 @@ from harness.assessment.repeated_game import difference_when_repeated
 from harness.campaign.preflight import OpenCampaign
 from harness.campaign.storage.checksums import digest_of
 from harness.campaign.storage.run_folder import RunFolder
+from harness.config.driver import WithFiles
 from harness.files import make_folder, write_atomically
-
-_CODE = ("process", "fmu", "stable_baselines3", "python", "onnx", "torchscript")
-"""Kinds of drivers whose code is not the harness's own."""
 
 
 def varying_drivers(campaign: OpenCampaign, folder: RunFolder | None = None) -> dict[str, str]:
@@ -31,7 +29,7 @@ def varying_drivers(campaign: OpenCampaign, folder: RunFolder | None = None) -> 
     scene = campaign.hashes_of(campaign.scene)
     found = {}
     for driver in (campaign.ego_driver, *campaign.other_egos.values()):
-        if driver is None or driver.kind not in _CODE:
+        if driver is None or not isinstance(driver.document, WithFiles):  # it runs no code but the harness's own
             continue
         key = digest_of([driver.identity, scene])
         if key not in known:

@@ -18,12 +18,12 @@ from harness.campaign.plan.stages import Stage, TrainingStage
 from harness.campaign.preflight import OpenCampaign
 from harness.campaign.results.kept_results import RunResult, kept_result
 from harness.campaign.storage.learned import Entries, did_not_learn, judged, recorded_goals
-from harness.campaign.storage.manifest import FINISHED, FORMAT
+from harness.campaign.storage.manifest import FORMAT
 from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.run_log import LOGGER
 from harness.campaign.storage.versions import versions, versions_of_numbers
 from harness.errors import LEARNERS, plain, without_learners
-from harness.evaluation.competence import DID_NOT_LEARN
+from harness.evaluation.competence import DID_NOT_LEARN, FINISHED
 from harness.reports.provenance import mixed_versions, warn
 
 NOTHING_TO_DO = "Nothing to do: every stage is finished, and the results are those of this version."

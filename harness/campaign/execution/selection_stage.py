@@ -18,12 +18,13 @@ from harness.assessment.seated_arm import SeatedArm
 from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import StageRun
 from harness.campaign.plan.planned_drivers import Side
-from harness.campaign.plan.stages import SelectionStage, stage_id
+from harness.campaign.plan.stages import SelectionStage
 from harness.campaign.storage.run_folder import SELECTED
 from harness.campaign.storage.versions import versions_of_numbers
 from harness.drivers.policy_file import policy_files, read_policy, write_policy
 from harness.errors import StageFailed
 from harness.evaluation.game_theory.policy_selection import CandidateGames, best_candidate, selection_rows
+from harness.evaluation.strategies import stage_id
 from harness.evaluation.tables import table_of, write_csv
 from harness.game.outcome import Outcome
 from harness.game.roles import EGO, ROLES

@@ -52,7 +52,6 @@ from harness.campaign.plan.stages import (
     SelectionStage,
     Stage,
     TrainingStage,
-    stage_id,
 )
 from harness.campaign.plan.strategy_stages import SeedStages, ego_learns
 from harness.config.campaign import Campaign
@@ -69,6 +68,7 @@ from harness.evaluation.strategies import (
     RoundAnswer,
     player_of,
     round_of,
+    stage_id,
     strategy_name,
 )
 from harness.game.roles import EGO, NON_EGO

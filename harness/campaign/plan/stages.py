@@ -32,6 +32,7 @@ from harness.evaluation.strategies import (
     Strategy,
     SumoNonEgo,
     player_of,
+    stage_id,
     strategy_name,
 )
 from harness.game.roles import EGO
@@ -324,8 +325,3 @@ def arms_of(stages: Iterable[Stage]) -> dict[str, Arm]:
 def strategies_of(stages: Iterable[Stage]) -> dict[str, Strategy]:
     """The strategies that are trained in stages, by name."""
     return {stage.name: stage.strategy for stage in stages if isinstance(stage, TrainingStage)}
-
-
-def stage_id(name: str, seed: int) -> str:
-    """A stage's name in the run folder."""
-    return f"{name}-seed{seed}"

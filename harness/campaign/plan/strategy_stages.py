@@ -22,7 +22,7 @@ from harness.campaign.plan.planned_drivers import (
     members_of,
     persona_of,
 )
-from harness.campaign.plan.stages import AssessmentStage, ConditioningStage, Gate, TrainingStage, stage_id
+from harness.campaign.plan.stages import AssessmentStage, ConditioningStage, Gate, TrainingStage
 from harness.config.campaign import LEARNED, SHIPPED, SUMO, Campaign
 from harness.config.training import ATTENTIVE_SHARE, Training
 from harness.config.traits import PAYOFF, UNREAD, PersonTraits
@@ -43,6 +43,7 @@ from harness.evaluation.strategies import (
     Strategy,
     SumoNonEgo,
     player_of,
+    stage_id,
     strategy_name,
 )
 from harness.game.roles import NON_EGO

@@ -13,9 +13,10 @@ from junitparser import TestCase
 from harness.campaign.results.kept_results import RunResult
 from harness.campaign.results.shown_result import Verdicts
 from harness.campaign.storage.learned import did_not_learn
-from harness.campaign.storage.manifest import FINISHED, FORMAT
+from harness.campaign.storage.manifest import FORMAT
 from harness.campaign.storage.run_folder import RunFolder
 from harness.evaluation.comparisons.acceptance_checks import Check
+from harness.evaluation.competence import FINISHED
 from harness.files import write_atomically
 from harness.reports.acceptance_wording import TITLES, sentence
 from harness.reports.junit import case_of, write_junit

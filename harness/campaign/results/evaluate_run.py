@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from harness.campaign.plan.stages import AssessmentStage, arms_of, stage_id, strategies_of
+from harness.campaign.plan.stages import AssessmentStage, arms_of, strategies_of
 from harness.campaign.results.drawn_starts import drawn_starts
 from harness.campaign.results.matchups import matchups_of
 from harness.campaign.results.read_run import ReadRun
@@ -124,7 +124,8 @@ def _goals(run: ReadRun) -> dict[str, Goals]:
 def _with_ends(training: pd.DataFrame, entries: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
     """The learning curves, with the judgement of the manifest in the last row of each training."""
     last = training.drop_duplicates(["stage", "seed"], keep="last")
-    ends = [entries[stage_id(str(row.stage), row.seed)].get("stopped") for row in last.itertuples()]
+    stopped = {(each["name"], each["seed"]): each.get("stopped") for each in entries.values()}
+    ends = [stopped[row.stage, row.seed] for row in last.itertuples()]
     return training.assign(stopped=pd.Series(ends, index=last.index, dtype=object).reindex(training.index).fillna(""))
 
 

@@ -24,7 +24,7 @@ from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.versions import versions
 from harness.errors import FAILED
 from harness.evaluation.comparisons.tied_ranks import with_shield
-from harness.evaluation.tables import table_of, write_csv
+from harness.evaluation.tables import rows_in_json, table_of, write_csv
 from harness.files import write_atomically
 from harness.reports.junit import case_of, write_junit
 from harness.reports.league_page import render_league, sentence_of
@@ -59,7 +59,7 @@ def write_league(ego: str, folder: Path, results: Mapping[str, RunResult]) -> Le
     _write_junit(ego, folder / JUNIT, table, results)
     # of a league, what fails is that something was not played: it has no bounds
     exit_code = FAILED if failed else 0
-    record = {"ego": ego, "exit_code": exit_code, "failed": failed, "rows": in_json(table), "versions": versions()}
+    record = {"ego": ego, "exit_code": exit_code, "failed": failed, "rows": rows_in_json(table), "versions": versions()}
     write_record(folder / RESULT, record)
     return LeagueResult(table=table, failed=failed, exit_code=exit_code, record=record)
 
@@ -73,16 +73,6 @@ def worst_pairings_first(table: pd.DataFrame) -> pd.DataFrame:
         kind="stable",
         ignore_index=True,
     )
-
-
-def in_json(table: pd.DataFrame) -> list[dict[str, Any]]:
-    """The rows of the table as `result.json` has them."""
-    return [{name: _in_json(cell) for name, cell in row.items()} for row in table.to_dict("records")]
-
-
-def _in_json(cell: Any) -> Any:
-    """A cell as JSON has it: null where it is empty."""
-    return None if pd.isna(cell) else cell
 
 
 def _failures(results: Mapping[str, RunResult]) -> Iterator[str]:

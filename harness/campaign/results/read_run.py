@@ -11,7 +11,7 @@ import pandas as pd
 from pydantic import ConfigDict, Field, ValidationError
 from rich.console import Console
 
-from harness.campaign.plan.stages import Stage, stage_id
+from harness.campaign.plan.stages import Stage
 from harness.campaign.results.shown_work import doing
 from harness.campaign.storage.arm_tables import PLAYED, arm_tables
 from harness.campaign.storage.manifest import campaign_in, done_in, planned
@@ -20,6 +20,7 @@ from harness.config.campaign import Campaign
 from harness.config.toml_reading import Document
 from harness.drivers.policy_file import policy_files, read_card
 from harness.errors import UsageError
+from harness.evaluation.strategies import stage_id
 from harness.evaluation.tables import is_of_a_search, joined, read_csv
 from harness.road.scene.open_scene import OpenScene, open_scene
 

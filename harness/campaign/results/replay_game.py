@@ -23,7 +23,7 @@ from harness.config.toml_reading import nearest
 from harness.errors import UsageError, plain
 from harness.evaluation.people import people_in
 from harness.evaluation.rule_book.causes import causes_in_words
-from harness.evaluation.tables import read_csv
+from harness.evaluation.tables import read_csv, rows_in_json
 from harness.evaluation.trace_file import TraceReader
 from harness.evaluation.worst_first import FAILURES, replay_name, worst_first
 from harness.replay import follow_in_sumo_gui, names_in_pictures, write_film, write_replay
@@ -91,9 +91,8 @@ def game_table(run: Path, chosen: GameList) -> Table:
 def game_records(run: Path, chosen: GameList) -> dict[str, Any]:
     """The chosen games of a run, for JSON: a number that is not known is None."""
     games, number, pages = _listed(run, chosen)
-    known = games.astype(object).where(games.notna() & ~games.isin([math.inf, -math.inf]), None)
     shown = {"page": chosen.page, "pages": pages, "number": number}
-    return {"run": str(run), **shown, "games": known.to_dict("records")}
+    return {"run": str(run), **shown, "games": rows_in_json(games)}
 
 
 def _chosen(run: Path, episodes: pd.DataFrame, chosen: GameList) -> pd.DataFrame:

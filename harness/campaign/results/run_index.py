@@ -13,10 +13,10 @@ from typing import Any
 
 from harness.campaign.results.ci_files import RESULT
 from harness.campaign.storage.locks import is_held
-from harness.campaign.storage.manifest import FINISHED
 from harness.campaign.storage.run_folder import MANIFEST, RunFolder
 from harness.campaign.storage.run_log import LOG
 from harness.errors import HarnessError, UsageError
+from harness.evaluation.competence import FINISHED
 from harness.evaluation.strategies import is_named_of_a_trait, is_named_of_the_naive_ego
 from harness.reports.index_page import IndexedRun, WorstCell
 from harness.reports.provenance import ego_of, finished_on, scene_of

@@ -9,7 +9,6 @@ import pandas as pd
 
 from harness.campaign.plan.attribution_arms import trait_questions
 from harness.campaign.plan.paper_rounds import questions
-from harness.campaign.plan.stages import stage_id
 from harness.campaign.results.read_run import ReadRun
 from harness.campaign.storage.manifest import is_tuned, traits_in
 from harness.config.campaign import Campaign
@@ -18,7 +17,7 @@ from harness.evaluation.comparisons.attribution import attribute
 from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.competence import Question
 from harness.evaluation.people import people_in
-from harness.evaluation.strategies import NaiveEgo, ReconfiguredEgo, RetrainedEgo, against_persona
+from harness.evaluation.strategies import NaiveEgo, ReconfiguredEgo, RetrainedEgo, against_persona, stage_id
 from harness.evaluation.tables import joined
 from harness.evaluation.undecided import count_undecided
 from harness.game.initial_state import member_in_episode

@@ -13,9 +13,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from harness.campaign.plan.alone_bounds import bounds_of
-from harness.campaign.plan.stages import ConditioningStage, Stage, TrainingStage, stage_id
+from harness.campaign.plan.stages import ConditioningStage, Stage, TrainingStage
 from harness.config.campaign import Campaign
 from harness.evaluation.competence import ALONE, DID_NOT_LEARN, Goals
+from harness.evaluation.strategies import stage_id
 
 _JUDGEMENT = ("goals", "played", "goal_share_asked")
 

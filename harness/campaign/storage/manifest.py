@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field, ValidationError, model_validator
 
 from harness.campaign.plan.plan import plan
-from harness.campaign.plan.stages import Stage, stage_id
+from harness.campaign.plan.stages import Stage
 from harness.campaign.storage.checksums import digest_of
 from harness.config.campaign import Campaign, CampaignName, Seed
 from harness.config.persona import Persona
@@ -19,6 +19,7 @@ from harness.config.scene import Name
 from harness.config.toml_reading import Document
 from harness.config.traits import PersonTraits, traits_of
 from harness.errors import UsageError
+from harness.evaluation.strategies import stage_id
 
 FORMAT = 1
 """Of run folders. It is raised when a file of a run folder gets another form, or the same inputs give other numbers: a
@@ -29,8 +30,6 @@ Count = Annotated[int, Field(ge=0, le=10**15)]
 Text = Annotated[str, Field(max_length=10_000)]
 _MOST_LISTED = 3
 _STAGE = re.compile(r"[A-Za-z][A-Za-z0-9_]*-seed\d+")
-FINISHED = ("done", "settled")
-"""Statuses of a finished stage; `settled`: an approximate equilibrium or a taken answer left nothing to do."""
 
 
 class _Record(Document):

@@ -29,7 +29,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from harness.campaign.plan.stages import stage_id
 from harness.campaign.storage.checksums import mismatches, read_checksums, write_checksums
 from harness.campaign.storage.locks import InUse, only_one, wait_for_workers
 from harness.campaign.storage.manifest import (
@@ -43,6 +42,7 @@ from harness.campaign.storage.manifest import (
 )
 from harness.campaign.storage.run_log import LOG, run_log
 from harness.errors import Problem, UsageError
+from harness.evaluation.strategies import stage_id
 from harness.files import content_of, drop_scratch, has_digest, leads_out, links_in, make_folder, write_atomically
 
 MANIFEST = "manifest.json"
