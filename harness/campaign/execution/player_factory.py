@@ -17,6 +17,7 @@ from harness.campaign.plan.planned_drivers import (
     EquilibriumMixture,
     External,
     FixedMixture,
+    Learned,
     PlannedDriver,
     PlannedMember,
     Reconfigured,
@@ -112,7 +113,7 @@ class PlayerFactory:
         best = int(np.argmax(earned))
         return candidates[best], {"chosen": stages[best], "earned": dict(zip(stages, earned, strict=True))}
 
-    def policy_folder(self, planned: Trained | TrainedBefore) -> Path:
+    def policy_folder(self, planned: Learned) -> Path:
         """The folder of a policy, of this run or of another."""
         if isinstance(planned, Trained):
             return self.context.folder.policy(planned.stage)
@@ -165,5 +166,5 @@ class PlayerFactory:
                 return self.context.policy_drivers[stage].make(car, sampled)
             case Shipped():
                 raise TypeError("are several drivers")
-            case Trained() | TrainedBefore():
+            case Learned():
                 return LearnedDriver(read_policy(self.policy_folder(planned)), sampled)

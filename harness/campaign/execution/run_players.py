@@ -14,10 +14,10 @@ from harness.campaign.plan.planned_drivers import (
     EquilibriumMixture,
     External,
     FixedMixture,
+    Learned,
     PlannedMember,
     Reconfigured,
     Shielded,
-    Trained,
     TrainedBefore,
     driver_in,
     members_of,
@@ -116,7 +116,7 @@ class RunPlayers:
         if isinstance(planned, TrainedBefore) and context.policies is None:
             message = f"{planned.stage!r} was read from {self.document.policies!r}"
             raise UsageError.of(self._folder.path, planned.stage, message, "it is not found: name it with --policies")
-        if isinstance(planned, Trained | TrainedBefore):
+        if isinstance(planned, Learned):
             policy = self._players.policy_folder(planned)
         return SeatedDriver(persona=persona, policy=policy)
 

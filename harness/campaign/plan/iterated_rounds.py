@@ -37,10 +37,10 @@ from harness.campaign.plan.planned_drivers import (
     BestOf,
     EquilibriumMixture,
     FixedMixture,
+    Learned,
     PlannedDriver,
     Side,
     Trained,
-    TrainedBefore,
     members_of,
     persona_of,
 )
@@ -212,7 +212,7 @@ def _plan_response(campaign: Campaign, pair: AssessmentStage, learner: int) -> l
     (own,), other = pair.sides[learner], pair.sides[1 - learner]
     trainings = []
     for start in range(1, campaign.best_response.starts + 1):
-        initial = own if start == 1 and isinstance(own, Trained | TrainedBefore) else None
+        initial = own if start == 1 and isinstance(own, Learned) else None
         from_nothing = learner == NON_EGO and initial is None
         trainings.append(
             TrainingStage(

@@ -7,6 +7,7 @@ closed union of which `execution.player_factory` makes drivers.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import chain
 from typing import Literal, TypeAlias
@@ -34,8 +35,8 @@ class Reconfigured:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Trained:
-    """The policy that a training of this plan makes."""
+class Learned:
+    """The policy that a training made: one of its two subclasses."""
 
     stage: str
     persona: str = ""
@@ -45,14 +46,13 @@ class Trained:
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrainedBefore:
-    """The policy that a training of this name made in another run, read from the campaign's folder of policies."""
+class Trained(Learned):
+    """The policy that a training of this plan makes."""
 
-    stage: str
-    persona: str = ""
-    """The persona with which it drives; empty: the ego's own."""
-    borrowed: Borrowed | None = None
-    """The trait with which it drives that is not the persona's own."""
+
+@dataclass(frozen=True, kw_only=True)
+class TrainedBefore(Learned):
+    """The policy that a training of this name made in another run, read from the campaign's folder of policies."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,12 +96,18 @@ class Shielded:
     rule: Literal["rss"]
 
 
-PlannedMember = SumoDriven | External | Reconfigured | Trained | TrainedBefore | Shipped
+PlannedMember = SumoDriven | External | Reconfigured | Learned | Shipped
 """One driver, the same in every game, or the people of a scene."""
 PlannedDriver = PlannedMember | FixedMixture | EquilibriumMixture | BestOf | Shielded
 Side: TypeAlias = tuple[PlannedDriver, ...]
 """The drivers of a side: those of the non-egos' places in their order, from the first again where there are more places
 than drivers. Empty: the side takes no part."""
+
+
+def one_of(drivers: Iterable[tuple[PlannedMember, float]]) -> PlannedDriver:
+    """Drivers by their shares, one of which is drawn for each game; of one, this one."""
+    members, shares = zip(*drivers, strict=True)
+    return members[0] if len(members) == 1 else FixedMixture(members=members, shares=shares)
 
 
 def driver_in(side: Side, place: int) -> PlannedDriver | None:
@@ -119,10 +125,7 @@ def _without_shipped(driver: PlannedDriver) -> PlannedDriver:
         case Shipped():
             return SumoDriven()
         case FixedMixture(members=members, shares=shares):
-            left = [pair for pair in zip(members, shares, strict=True) if not isinstance(pair[0], Shipped)]
-            if len(left) == 1:
-                return left[0][0]
-            return FixedMixture(members=tuple(each for each, _ in left), shares=tuple(share for _, share in left))
+            return one_of(pair for pair in zip(members, shares, strict=True) if not isinstance(pair[0], Shipped))
         case _:
             return driver
 
@@ -133,11 +136,8 @@ def by_control(side: Side) -> tuple[tuple[Side, float], ...]:
     match side:
         case (FixedMixture(members=members, shares=shares),) if SumoDriven() in members:
             people = [pair for pair in zip(members, shares, strict=True) if pair[0] != SumoDriven()]
-            taken_over = FixedMixture(
-                members=tuple(each for each, _ in people), shares=tuple(share for _, share in people)
-            )
-            of_people = sum(taken_over.shares)
-            return ((taken_over,), of_people), ((SumoDriven(),), sum(shares) - of_people)
+            of_people = sum(share for _, share in people)
+            return ((one_of(people),), of_people), ((SumoDriven(),), sum(shares) - of_people)
         case _:
             return ((side, 1.0),)
 
@@ -152,7 +152,7 @@ def members_of(*drivers: PlannedDriver) -> tuple[PlannedMember, ...]:
 def persona_of(driver: PlannedDriver) -> str:
     """The name of the persona with which a driver drives; empty: the ego's own."""
     match driver:
-        case Trained(persona=persona) | TrainedBefore(persona=persona) | BestOf(persona=persona):
+        case Learned(persona=persona) | BestOf(persona=persona):
             return persona
         case _:
             return ""
@@ -160,7 +160,7 @@ def persona_of(driver: PlannedDriver) -> str:
 
 def borrowed_of(driver: PlannedDriver) -> Borrowed | None:
     """The trait with which a driver drives that is not its persona's own."""
-    return driver.borrowed if isinstance(driver, Trained | TrainedBefore) else None
+    return driver.borrowed if isinstance(driver, Learned) else None
 
 
 def description(driver: PlannedDriver) -> str:
@@ -170,7 +170,7 @@ def description(driver: PlannedDriver) -> str:
             return "sumo"
         case External(name=name):
             return name or "given"
-        case Reconfigured(stage=stage) | Trained(stage=stage) | TrainedBefore(stage=stage):
+        case Reconfigured(stage=stage) | Learned(stage=stage):
             return stage
         case Shipped():
             return "the shipped people of the scene"

@@ -12,6 +12,7 @@ from typing import ClassVar, TypeAlias
 from harness.campaign.plan.planned_drivers import (
     EquilibriumMixture,
     External,
+    Learned,
     PlannedDriver,
     Reconfigured,
     Side,
@@ -124,13 +125,13 @@ class TrainingStage(_Stage):
 
     strategy: Strategy
     opponent: Side
-    initial: Trained | TrainedBefore | None
+    initial: Learned | None
     """The policy that it starts from; None: a new one."""
     alone_share: float
     """The share of its games without the opponent."""
     attentive_share: float = 0.0
     """The share of its budget in which the learner's attention does not lapse."""
-    best_known: Trained | TrainedBefore | None = field(default=None, repr=False)
+    best_known: Learned | None = field(default=None, repr=False)
     """Of an ego that replays starts by regret: the best known ego, with which it is compared. Not a part of the stage's
     text, so that a training without one has the key that it had before there were any."""
 
@@ -169,7 +170,7 @@ class TrainingStage(_Stage):
 class ConditioningStage(_Stage):
     """The policy of one persona, from the policy that several learned together."""
 
-    of: Trained | TrainedBefore
+    of: Learned
 
     kind, verb, unit = "conditioning", "derive", "policies"
 

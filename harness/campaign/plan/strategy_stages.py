@@ -10,7 +10,7 @@ from pathlib import PurePath
 
 from harness.campaign.plan.planned_drivers import (
     External,
-    FixedMixture,
+    Learned,
     PlannedDriver,
     PlannedMember,
     Reconfigured,
@@ -20,6 +20,7 @@ from harness.campaign.plan.planned_drivers import (
     Trained,
     TrainedBefore,
     members_of,
+    one_of,
     persona_of,
 )
 from harness.campaign.plan.stages import AssessmentStage, ConditioningStage, Gate, TrainingStage
@@ -94,13 +95,13 @@ class SeedStages:
 
     def mixture(self, shares: Mapping[str, float]) -> PlannedDriver:
         """Personas by their shares, one of which is drawn for each game; of one, its driver."""
-        return _one_of((self._driver(PersonaNonEgo(persona=name)), share) for name, share in shares.items())
+        return one_of((self._driver(PersonaNonEgo(persona=name)), share) for name, share in shares.items())
 
     def robust_opponent(self, names: Iterable[str]) -> PlannedDriver:
         """The opponent in the training of the robust ego: personas, `sumo` or `shipped` in equal shares, one of them in
         each game. A persona has the policies of the other training seeds; of a single seed, its own."""
         named = [self._met_by_robust(name) for name in names]
-        return _one_of((driver, 1.0 / len(drivers)) for drivers in named for driver in drivers)
+        return one_of((driver, 1.0 / len(drivers)) for drivers in named for driver in drivers)
 
     def _met_by_robust(self, name: str) -> list[PlannedMember]:
         seeds = self.campaign.seeds
@@ -181,18 +182,12 @@ class SeedStages:
             case _:
                 return self._learned(strategy)
 
-    def _learned(self, strategy: Strategy, persona: str = "") -> Trained | TrainedBefore:
+    def _learned(self, strategy: Strategy, persona: str = "") -> Learned:
         stage = stage_id(strategy_name(strategy), self.seed)
         is_derived = self.campaign.non_ego_training.together and isinstance(strategy, PersonaNonEgo)
         if self.campaign.policies is None or is_derived:
             return Trained(stage=stage, persona=persona)
         return TrainedBefore(stage=stage, persona=persona)
-
-
-def _one_of(drivers: Iterable[tuple[PlannedMember, float]]) -> PlannedDriver:
-    """Drivers by their shares, one of which is drawn for each game; of one, this one."""
-    members, shares = zip(*drivers, strict=True)
-    return members[0] if len(members) == 1 else FixedMixture(members=members, shares=shares)
 
 
 def training_settings(campaign: Campaign, stage: TrainingStage) -> Training:
