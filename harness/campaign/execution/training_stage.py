@@ -128,5 +128,7 @@ def _policy_card(stage: TrainingStage, spec: TrainingSpec) -> dict[str, Any]:
         **({"roads": roads} if roads else {}),
         "against": " and ".join(map(description, stage.opponent)) or None,
         "began_from": stage.initial.stage if stage.initial is not None else None,
+        "alone_share": stage.alone_share,
+        "attentive_share": stage.attentive_share,
         "training": {**spec.settings.model_dump(mode="json"), "demonstration_steps": spec.demonstration_steps},
     }

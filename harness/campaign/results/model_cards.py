@@ -18,12 +18,11 @@ from harness.campaign.storage.manifest import campaign_in, planned
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign
 from harness.config.persona import Persona
-from harness.config.training import ATTENTIVE_SHARE
 from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.strategies import NaiveEgo, RobustEgo, against_persona, persona_alone, strategy_name
 from harness.files import write_atomically
 from harness.game.payoff_terms import GROUPS, TERMS
-from harness.game.roles import EGO, NON_EGO, ROLES
+from harness.game.roles import NON_EGO, ROLES
 from harness.reports.human_ranges import crashes_alone
 from harness.reports.learning import stopped
 from harness.reports.numbers import MISSING, interval, number, percent
@@ -139,8 +138,8 @@ def _facts(
         personas = ", ".join(f"`{each}`" for each in policy["learned_with"])
         yield "learned in", f"`{policy['learned_in']}`, one network of {personas}"
     yield from _training_facts(entry, manifest, policy)
-    if persona.attention is not None and policy["player"] == ROLES[NON_EGO]:
-        yield "no lapses in", f"the first {percent(ATTENTIVE_SHARE)} of the budget"
+    if persona.attention is not None and policy.get("attentive_share"):  # an older card does not say it
+        yield "no lapses in", f"the first {percent(policy['attentive_share'])} of the budget"
 
 
 def _training_facts(
@@ -155,8 +154,8 @@ def _training_facts(
     yield "against", partner.get(against, f"`{against}`")
     if isinstance(people := policy.get("people"), int) and against is not None:
         yield "people in a game", str(people)
-    if against is not None:
-        yield "games without the other player", percent(_alone_share(entry, policy, campaign))
+    if against is not None and policy.get("alone_share") is not None:
+        yield "games without the other player", percent(policy["alone_share"])
     yield "initial policy", f"`{policy['began_from']}`" if policy["began_from"] else _beginning(policy["training"])
     reason = {"converged": "stopped by convergence", "budget": "the whole budget"}.get(entry["stopped"], "")
     reason = stopped(entry) if entry["stopped"] == DID_NOT_LEARN else reason
@@ -169,13 +168,6 @@ def _training_facts(
 def _beginning(settings: Mapping[str, Any]) -> str:
     shown = settings["demonstration_steps"]
     return f"none; it imitated a rule-based driver, shown in {shown:,} steps" if shown else "none"
-
-
-def _alone_share(entry: Mapping[str, Any], policy: Mapping[str, Any], campaign: Campaign) -> float:
-    if entry["name"] == strategy_name(NaiveEgo()):
-        return campaign.naive_training.alone_share
-    how = campaign.retraining if policy["player"] == ROLES[EGO] else campaign.non_ego_training
-    return how.alone_share
 
 
 def _given(manifest: Mapping[str, Any], campaign: Campaign) -> str:

@@ -17,6 +17,7 @@ from harness.campaign.storage.arm_tables import PLAYED, arm_tables
 from harness.campaign.storage.manifest import campaign_in, done_in, planned
 from harness.campaign.storage.run_folder import JUDGED, SELECTED, TAKEN_OVER, RunFolder
 from harness.config.campaign import Campaign
+from harness.config.scene import Share
 from harness.config.toml_reading import Document
 from harness.drivers.policy_file import policy_files, read_card
 from harness.errors import UsageError
@@ -34,6 +35,8 @@ class _PolicyCard(Document):
     began_from: str | None = Field(max_length=1000)
     learned_in: str | None = Field(None, max_length=1000)
     learned_with: list[Annotated[str, Field(max_length=100)]] = Field([], max_length=50)
+    alone_share: Share | None = None
+    attentive_share: Share | None = None
     training: dict[str, bool | int | float | str | list[int] | None]
 
 

@@ -41,6 +41,7 @@ def test_training__by_regret_is_given_the_naive_ego_and_its_table_has_the_regret
 
     def recording(spec: TrainingSpec, **options: Any) -> TrainingResult:
         specs.append(spec)
+        assert (options["card"]["alone_share"], options["card"]["attentive_share"]) == (0.25, 0.0)
         return TrainingResult(policy=some_policy(seed=9), progress=progress, stopped="budget")
 
     monkeypatch.setattr(harness.campaign.execution.training_stage, "train", recording)

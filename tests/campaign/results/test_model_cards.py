@@ -68,6 +68,8 @@ NON_EGO_POLICY = {
     "player": "non_ego",
     "persona": "paper_distracted",
     "against": "naive-seed1",
+    "alone_share": 0.5,
+    "attentive_share": 0.5,
 }
 SUMMARY = typed(
     pd.DataFrame(
@@ -164,7 +166,11 @@ OF_SPEEDY = """
         case("naive-seed1", "it imitated a rule-based driver, shown in 38,400 steps |", training=shown(38_400)),
         case("naive-seed1", "| initial policy | none |", training=shown(0)),
         case(
-            "retrained_paper_distracted-seed1", OF_RETRAINED, against="paper_distracted-seed1", began_from="naive-seed1"
+            "retrained_paper_distracted-seed1",
+            OF_RETRAINED,
+            against="paper_distracted-seed1",
+            began_from="naive-seed1",
+            alone_share=0.25,
         ),
         case("paper_distracted-seed1", OF_NON_EGO),
         case("paper_distracted-seed1", OF_SPEEDY, persona("paper_speedy")),
@@ -176,6 +182,21 @@ OF_SPEEDY = """
 )
 def test_card__states_its_facts(card: str, rows: list[str]) -> None:
     assert [row for row in rows if row not in card] == []
+
+
+def test_card__has_the_shares_of_the_training_and_an_older_policy_has_none() -> None:
+    best_response = {
+        **NON_EGO_POLICY,
+        "began_from": "paper_distracted-seed1",
+        "alone_share": 0.0,
+        "attentive_share": 0.0,
+    }
+    card = lines(model_card("paper_distracted-seed1", MANIFEST, SUMMARY, REALISM, best_response))
+    assert "| games without the other player | 0 % |" in card
+    assert not any("no lapses in" in line for line in card)
+    older = {key: value for key, value in NON_EGO_POLICY.items() if not key.endswith("_share")}
+    card = lines(model_card("paper_distracted-seed1", MANIFEST, SUMMARY, REALISM, older))
+    assert not any("no lapses in" in line or "games without" in line for line in card)
 
 
 def test_card__figures_are_those_of_its_own_arms_and_seed() -> None:
