@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from harness.campaign.plan.campaign_checks import check_names, check_people, check_roads
+from harness.campaign.plan.campaign_checks import check_campaign
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import Stage
 from harness.campaign.plan.strategy_stages import crossplay_name
@@ -158,9 +158,8 @@ def open_campaign(
         raise UsageError(problems)
     read = [each for each in personas if each is not None]
     tunable, traits, names = _is_tunable(ego_driver), traits_of(read, baseline), [persona.name for persona in read]
-    check_people(file, document, len(scene.document.non_ego))
-    check_roads(file, document, [_game_of(each) == _game_of(scene) for each in opened])
-    check_names(file, document, names, tunable, traits)
+    people, alike = len(scene.document.non_ego), [_game_of(each) == _game_of(scene) for each in opened]
+    check_campaign(file, document, names, tunable, traits, people=people, alike=alike)
     shipped = _shipped_people(file, document, (scene, *opened))
     files, policy_drivers = list[Path](), dict[str, ExternalDriver]()
     if policies is not None and policies_exist:

@@ -12,7 +12,7 @@ from harness.campaign.plan.strategy_stages import crossplay_name
 from harness.config.campaign import LEARNED, SHIPPED, SUMO, Campaign, Rounds
 from harness.config.toml_reading import nearest
 from harness.config.training import Retraining
-from harness.config.traits import UNREAD, PersonTraits
+from harness.config.traits import PersonTraits
 from harness.errors import Problem, UsageError
 from harness.evaluation.strategies import NaiveEgo, RobustEgo, strategy_name
 
@@ -24,32 +24,29 @@ _Found: TypeAlias = Iterator[tuple[str, str, str]]
 """Key, what is wrong, remedy."""
 
 
-def check_people(file: Path, document: Campaign, people: int) -> None:
-    """Raises UsageError for everything in a campaign that does not fit a scene with this number of people."""
-    _refuse(file, (*_people(document, people), *_places(document, people)))
-
-
-def check_roads(file: Path, document: Campaign, alike: Sequence[bool]) -> None:
-    """Raises UsageError for everything in a campaign that does not fit the `roads` on which its egos learn too; `alike`
-    says of each whether its players and steps are those of the scene."""
-    _refuse(file, _roads(document, alike))
-
-
-def check_names(
+def check_campaign(
     file: Path,
     document: Campaign,
     personas: Sequence[str],
-    tunable: bool = False,
-    traits: PersonTraits = UNREAD,
+    tunable: bool,
+    traits: PersonTraits,
+    *,
+    people: int,
+    alike: Sequence[bool],
 ) -> None:
-    """Raises UsageError for every name that refers to nothing, or to two things, and for a baseline with which nothing
-    can be compared; `tunable`, `traits` as in `plan`."""
-    _refuse(file, (*_personas(document, personas, traits), *_other_egos(document), *_baseline(traits)))
-    _refuse(file, _arms(document, personas, tunable))
-    _refuse(file, _stages(document, personas, tunable, traits))
+    """Raises UsageError with every mistake of a campaign about what it names: what does not fit a scene with this
+    number of people, or the `roads` on which its egos learn too; names that refer to nothing, or to two things; a
+    baseline with which nothing can be compared.
+
+    `alike` says of each road whether its players and steps are those of the scene; `tunable`, `traits` as in `plan`.
+    Arms and stages are checked where the rest is right: only then is there a plan.
+    """
+    of_scene = (*_people(document, people), *_places(document, people), *_roads(document, alike))
+    _refuse(file, (*of_scene, *_personas(document, personas, traits), *_other_egos(document), *_baseline(traits)))
+    _refuse(file, (*_arms(document, personas, tunable), *_stages(document, personas, tunable, traits)))
 
 
-def _refuse(file: Path, found: _Found | Sequence[tuple[str, str, str]]) -> None:
+def _refuse(file: Path, found: Sequence[tuple[str, str, str]]) -> None:
     if problems := [Problem(str(file), *each) for each in found]:
         raise UsageError(problems)
 

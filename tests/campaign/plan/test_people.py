@@ -88,3 +88,13 @@ def test_campaign__what_does_not_fit_the_people_is_refused(
         open_campaign(file)
     assert f"{file}: {message}" in str(refused.value)
     assert len(str(refused.value).splitlines()) == 1
+
+
+def test_campaign__mistakes_about_people_and_about_names_are_told_at_once(
+    scene: str, personas: list[str], tmp_path: Path
+) -> None:
+    wrong = {"crossplay": {"egos": ["learned"]}, "roads": [str(PAPER_MERGE)]}
+    file = write_campaign(tmp_path, scene=scene, personas=personas, **wrong)
+    with pytest.raises(UsageError) as refused:
+        open_campaign(file)
+    assert [each.key for each in refused.value.problems] == ["crossplay", "crossplay.egos", "roads"]
