@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.markup import escape
 
 from harness.cli.output import AllowCode, AsJson, RunEgo, RunPath, RunSeed, output, print_json, print_plain
 
@@ -59,21 +58,23 @@ def falsify(
 
 def _shown(searches: pd.DataFrame) -> Table:
     """Who plays, a row each; the mean of the games until the first find, and how many searches found something."""
-    from rich.table import Table
+    from harness.reports.text_table import add_text_row, text_table
 
     criteria = list(dict.fromkeys(searches["criterion"]))
-    table = Table(box=None, pad_edge=False, title_justify="left")
-    table.title = "Mean games until the ego fails, and until it fails in a game that a reference driver prevents"
-    table.caption = "In brackets: searches that found one."
-    for heading in ("arm", "starts", *criteria):
-        table.add_column(escape(heading.replace("_", " ")), overflow="fold", no_wrap=heading in ("arm", "starts"))
+    headings = ("arm", "starts", *(each.replace("_", " ") for each in criteria))
+    table = text_table(
+        headings,
+        whole=("arm", "starts"),
+        title="Mean games until the ego fails, and until it fails in a game that a reference driver prevents",
+        caption="In brackets: searches that found one.",
+    )
     for (arm, searcher), rows in searches.groupby(["arm", "searcher"], sort=False):
         cells = []
         for criterion in criteria:
             first = rows.loc[rows["criterion"] == criterion, "first_game"]
             mean = first.fillna(rows["games"].iloc[0]).astype(float).mean()
             cells.append(f"{mean:.0f} ({first.notna().sum()}/{len(first)})")
-        table.add_row(escape(arm), escape(searcher), *cells)
+        add_text_row(table, arm, searcher, *cells)
     return table
 
 

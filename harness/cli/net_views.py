@@ -6,14 +6,13 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 from rich.table import Table
-from rich.text import Text
 
-from harness.errors import plain
 from harness.game.arrays import FloatArray
 from harness.game.initial_state import draw_initial_state
 from harness.maps.candidates import Candidate, CandidateKind, LaneWay, Priority
 from harness.maps.game_plans import GamePlan
 from harness.reports.net_page import Drawing, DrawnShape
+from harness.reports.text_table import add_text_row, text_table
 from harness.road.net.net_listing import ListedJunction, ListedLane
 from harness.road.scene.open_scene import OpenScene
 
@@ -22,33 +21,34 @@ _STARTS = 60  # drawn for each player
 
 def lane_table(lanes: Sequence[ListedLane]) -> Table:
     """A row for each lane."""
-    table = _table("lane", "length m", "limit m/s", "width m", "for", "from", "to", "leads to")
+    numbers = ("length m", "limit m/s", "width m")
+    table = text_table(("lane", *numbers, "for", "from", "to", "leads to"), right=numbers, header_style="bold")
     for lane in lanes:
-        numbers = (f"{lane.length_m:.1f}", f"{lane.limit_mps:.2f}", f"{lane.width_m:.1f}")
-        ends = (lane.start_junction, lane.end_junction, "\n".join(lane.leads_to))
-        table.add_row(lane.name, *numbers, lane.permissions, *ends)
+        size = (f"{lane.length_m:.1f}", f"{lane.limit_mps:.2f}", f"{lane.width_m:.1f}")
+        ends = (lane.start_junction, lane.end_junction, lane.leads_to)
+        add_text_row(table, lane.name, *size, lane.permissions, *ends)
     return table
 
 
 def conflict_table(conflicts: Sequence[Candidate]) -> Table:
     """A row for each conflict of two lanes, numbered from 1."""
-    table = _table("conflict", "junction", "kind", "first", "second", "priority")
+    table = text_table(("conflict", "junction", "kind", "first", "second", "priority"), header_style="bold")
     for number, each in enumerate(conflicts, start=1):
         kind = "merging" if each.kind is CandidateKind.MERGE else "crossing"
-        table.add_row(str(number), each.junction, kind, _way(each.first), _way(each.second), _priority(each))
+        add_text_row(table, str(number), each.junction, kind, _way(each.first), _way(each.second), _priority(each))
     return table
 
 
 def plan_table(rows: Sequence[tuple[GamePlan, str]]) -> Table:
     """A row for each game that can be made on a map, with its place."""
-    table = _table("conflict", "score", "kind", "place", "ego", "person", "priority")
+    headings = ("conflict", "score", "kind", "place", "ego", "person", "priority")
+    table = text_table(headings, header_style="bold")
     for plan, place in rows:
         candidate = plan.candidate
         person = "on foot" if candidate.second is None else " to ".join(candidate.second.edges)
         ego = " to ".join(dict.fromkeys(candidate.first.edges))
         numbers = str(plan.number), f"{plan.score:.0f}"
-        cells = (*numbers, candidate.kind.value, place, ego, person, plan_priority(plan))
-        table.add_row(*(Text(plain(cell)) for cell in cells))
+        add_text_row(table, *numbers, candidate.kind.value, place, ego, person, plan_priority(plan))
     return table
 
 
@@ -72,14 +72,6 @@ def _way(way: LaneWay | None) -> str:
 def _priority(conflict: Candidate, first: str = "the first") -> str:
     rules = {Priority.FIRST: first, Priority.FIRST_TO_ARRIVE: "first to arrive", Priority.NONE: "no rule"}
     return f"signals, then {rules[conflict.priority]}" if conflict.with_signals else rules[conflict.priority]
-
-
-def _table(*columns: str) -> Table:
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for name in columns:
-        number = name.endswith((" m", " m/s"))
-        table.add_column(name, justify="right" if number else "left", overflow="fold")
-    return table
 
 
 def drawing_of(

@@ -22,7 +22,7 @@ from harness.cli.output import (
     print_plain,
     say_unchecked,
 )
-from harness.errors import UsageError, plain
+from harness.errors import UsageError
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -272,15 +272,14 @@ def realism(run: RunPath, as_json: AsJson = False) -> None:
 
 def _beside_people(rows: Sequence[HumanRow]) -> Table:
     from rich.box import SIMPLE
-    from rich.table import Table
-    from rich.text import Text
 
-    table = Table(box=SIMPLE, padding=(0, 1, 0, 0), header_style="bold")
-    for heading in ("player", "figure", "games", "value (90 % of the games)", "people", ""):
-        table.add_column(heading, overflow="fold")
+    from harness.reports.text_table import add_text_row, text_table
+
+    headings = ("player", "figure", "games", "value (90 % of the games)", "people", "")
+    table = text_table(headings, box=SIMPLE, pad_edge=True, padding=(0, 1, 0, 0), header_style="bold")
     last = ""
     for row in rows:
         player, last = "" if row.player == last else row.player, row.player
         words = (player, row.figure, str(row.games), f"{row.value} ({row.spread})", row.people, row.realistic)
-        table.add_row(*(Text(plain(cell)) for cell in words), style="red" if row.is_outside else "")
+        add_text_row(table, *words, style="red" if row.is_outside else None)
     return table

@@ -10,6 +10,7 @@ from urllib.parse import quote
 
 from harness.reports.numbers import MISSING, duration, percent
 from harness.reports.page_template import environment_of
+from harness.reports.text_table import add_text_row, text_table
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -123,15 +124,11 @@ def _comparisons(runs: Sequence[IndexedRun]) -> Iterator[tuple[Path, list[tuple[
 
 def terminal_table(runs: Sequence[IndexedRun]) -> Table:
     """The index for the terminal, without what only the page has room for."""
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False)
-    for heading in ("run", "scene", "date", "naive fails", "later fails", "state"):
-        table.add_column(heading, overflow="fold")
+    table = text_table(("run", "scene", "date", "naive fails", "later fails", "state"))
     for run in runs:
         rates = [MISSING if cell is None else percent(cell.failures / cell.games) for cell in (run.naive, run.last)]
         style = "red" if _tone(run) == "harm" else None
-        table.add_row(run.name, run.scene, run.finished_on, *rates, state_words(run), style=style)
+        add_text_row(table, run.name, run.scene, run.finished_on, *rates, state_words(run), style=style)
     return table
 
 

@@ -15,6 +15,7 @@ from harness.reports.failure_table import ORDINARY, FailureCell
 from harness.reports.numbers import NO_SPACE, interval, number, percent
 from harness.reports.page_template import environment_of
 from harness.reports.severity_wording import RISK_TONES, risk_tone
+from harness.reports.text_table import add_text_row, text_table
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -72,29 +73,21 @@ def not_answered(table: pd.DataFrame) -> list[tuple[str, str]]:
 
 def league_terminal(table: pd.DataFrame) -> Table:
     """The twelve worst rows for the terminal."""
-    from rich.table import Table
-
-    shown = Table(box=None, pad_edge=False)
-    for heading in HEADINGS[:5]:
-        shown.add_column(heading, overflow="fold")
+    shown = text_table(HEADINGS[:5])
     for row in table.head(12).to_dict("records"):
         style = "dim" if row["reason"] else "red" if row["failure_rate"] > _MUCH else None
         scene, person, _, span, preventable, *_ = _texts(row)
-        shown.add_row(scene, person, _counts(row), span, preventable, style=style)
+        add_text_row(shown, scene, person, _counts(row), span, preventable, style=style)
     return shown
 
 
 def ranks_terminal(ranks: pd.DataFrame) -> Table:
-    from rich.table import Table
-
-    shown = Table(box=None, pad_edge=False)
-    for heading in ("rank", "ego", "failures", "95 %", "told apart from"):
-        shown.add_column(heading, overflow="fold")
+    shown = text_table(("rank", "ego", "failures", "95 %", "told apart from"))
     for row in ranks.to_dict("records"):
         span = interval(row["failure_rate_low"], row["failure_rate_high"])
         rate = f"{percent(row['failure_rate'])} of {row['games']}"
         ego, others = with_shield(row["ego"], row["shield"]), row["told_apart"].replace(" + ", ", ")
-        shown.add_row(str(row["rank"]), ego, rate, span, others or "nobody")
+        add_text_row(shown, str(row["rank"]), ego, rate, span, others or "nobody")
     return shown
 
 

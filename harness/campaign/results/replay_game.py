@@ -14,13 +14,12 @@ import pandas as pd
 from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
-from rich.text import Text
 
 from harness.campaign.results.read_run import episodes_of
 from harness.campaign.results.shown_work import progress_bar
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.toml_reading import nearest
-from harness.errors import UsageError, plain
+from harness.errors import UsageError
 from harness.evaluation.people import people_in
 from harness.evaluation.rule_book.causes import causes_in_words
 from harness.evaluation.tables import read_csv, rows_in_json
@@ -28,6 +27,7 @@ from harness.evaluation.trace_file import TraceReader
 from harness.evaluation.worst_first import FAILURES, replay_name, worst_first
 from harness.replay import follow_in_sumo_gui, names_in_pictures, write_film, write_replay
 from harness.replay.vehicles import legend
+from harness.reports.text_table import add_text_row, text_table
 from harness.road.scene.open_scene import OpenScene, open_scene
 
 _OTHERS = "--page, --rows, --outcome and ARM choose others"
@@ -69,22 +69,22 @@ def game_table(run: Path, chosen: GameList) -> Table:
     games, number, pages = _listed(run, chosen)
     players = ("ego", *people_in(games.columns))
     left = f"page {chosen.page} of {pages}, {number:,} games; {_OTHERS}; " if pages > 1 else ""
-    table = Table(
-        title=Text(f"Games of {run}, worst first"),
-        title_justify="left",
-        caption=Text(f"{left}severity orders the games: docs/columns.md; to watch one: harness replay RUN ARM EPISODE"),
+    columns = ("arm", "seed", "episode", *players, "cause", "TTC (s)", "severity")
+    headings = [name.replace("non_ego", "non-ego").replace("_", " ") for name in columns]
+    table = text_table(
+        headings,
+        whole={*headings} - {"arm", "cause"},
+        title=f"Games of {run}, worst first",
+        caption=f"{left}severity orders the games: docs/columns.md; to watch one: harness replay RUN ARM EPISODE",
         box=SIMPLE,
         padding=0,
+        pad_edge=True,
     )
-    for name in ("arm", "seed", "episode", *players, "cause", "TTC (s)", "severity"):
-        heading = name.replace("non_ego", "non-ego").replace("_", " ")
-        table.add_column(heading, overflow="fold", no_wrap=name not in ("arm", "cause"))
     for game in games.itertuples():
         ttc = "" if pd.isna(game.ego_min_ttc_s) else f"{game.ego_min_ttc_s:.1f}"
         severity = "" if math.isinf(game.severity) else f"{game.severity:.1f}"
         outcomes = [getattr(game, f"{name}_outcome") for name in players]
-        words = (game.arm, str(game.seed), str(game.episode), *outcomes, game.cause, ttc, severity)
-        table.add_row(*(Text(plain(cell)) for cell in words))  # text without markup, whatever the table contains
+        add_text_row(table, game.arm, str(game.seed), str(game.episode), *outcomes, game.cause, ttc, severity)
     return table
 
 
