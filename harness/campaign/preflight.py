@@ -7,11 +7,12 @@ document has problems of its own.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from harness.campaign.campaign_players import CampaignPlayers
 from harness.campaign.plan.campaign_checks import check_campaign
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import Stage
@@ -24,8 +25,7 @@ from harness.config.ego_perception import EgoPerception
 from harness.config.persona import Persona
 from harness.config.toml_reading import D, Document, read_document
 from harness.config.traits import traits_of
-from harness.drivers import driver_files, policy_origin
-from harness.drivers.car import car_of
+from harness.drivers import car, driver_files, policy_origin
 from harness.drivers.external import ExternalDriver, find_driver
 from harness.errors import Problem, UsageError, collect
 from harness.game.roles import EGO
@@ -40,29 +40,17 @@ QUICK_RESPONSE_STEPS = 131_072
 
 
 @dataclass(frozen=True, kw_only=True)
-class OpenCampaign:
+class OpenCampaign(CampaignPlayers):
     """A campaign whose documents are all read and checked."""
 
     file: Path
-    document: Campaign
     quick: bool
     scene: OpenScene
     roads: tuple[OpenScene, ...]
     """The scenes on whose roads the egos learn too."""
-    shipped: Mapping[str, tuple[ShippedPerson, ...]]
-    """The shipped people of these scenes, by the scene's name, where the ego is retrained against them."""
-    ego_persona: Persona
     personas: tuple[Persona, ...]
     baseline: Persona | None
     """The careful person of `[attribution]`; it may be one of the personas."""
-    ego_driver: ExternalDriver | None
-    """The ego's external driver; None where the ego is learned or driven by SUMO's own models."""
-    policies: Path | None
-    """The folder of policies trained in another run, where the campaign names one."""
-    other_egos: Mapping[str, ExternalDriver]
-    """The external drivers of the cross-play, by name."""
-    policy_drivers: Mapping[str, ExternalDriver]
-    """The policies of others in the folder `policies`, by name."""
     learned_elsewhere: dict[str, str]
     """Policies that learned in other games than the campaign's: how the games differ, in words."""
     hashes: dict[str, str]
@@ -83,11 +71,6 @@ class OpenCampaign:
         """Every stage of its plan, each after those it needs."""
         names = [persona.name for persona in self.personas]
         return plan(self.document, names, self.tunable, traits_of(self.personas, self.baseline))
-
-    @property
-    def people(self) -> dict[str, Persona]:
-        """Every persona that drives as a non-ego, by name: those of the campaign, and the baseline."""
-        return {each.name: each for each in (*self.personas, self.baseline) if each is not None}
 
     def hash_of(self, path: Path) -> str:
         """SHA-256 of one of those files."""
@@ -140,7 +123,7 @@ def open_campaign(
         collect(problems, partial(_note_origin, ego_driver, scene, ego_persona, elsewhere))
         sampled = ego_persona is not None and ego_persona.decisions == "sampled"
         games, road = _games_at_once(document, ego_driver), lambda: scene.cartesian_roads[EGO]
-        collect(problems, lambda: ego_driver.try_out(car_of(scene.world, EGO), sampled, games, road=road))
+        collect(problems, lambda: ego_driver.try_out(car.car_of(scene.world, EGO), sampled, games, road=road))
     other_egos: dict[str, ExternalDriver] = {}
     if document is not None:
         problems += _ignored_tables(file, document, ego_driver)
@@ -161,13 +144,14 @@ def open_campaign(
     people, alike = len(scene.document.non_ego), [_game_of(each) == _game_of(scene) for each in opened]
     check_campaign(file, document, names, tunable, traits, people=people, alike=alike)
     shipped = _shipped_people(file, document, (scene, *opened))
+    persons = {each.name: each for each in (*read, baseline) if each is not None}
     files, policy_drivers = list[Path](), dict[str, ExternalDriver]()
     if policies is not None and policies_exist:
         files, policy_drivers = check_policies(
             file,
             document=document,
             ego_persona=ego_persona,
-            personas=[*read, *([baseline] if baseline is not None else [])],
+            personas=list(persons.values()),
             stages=plan(document, names, tunable, traits),
             folder=policies,
             scene=scene,
@@ -188,6 +172,7 @@ def open_campaign(
         roads=tuple(opened),
         shipped=shipped,
         ego_persona=ego_persona,
+        people=persons,
         personas=tuple(read),
         baseline=baseline,
         ego_driver=ego_driver,
@@ -312,7 +297,7 @@ def _find_other_egos(
                 remedy = "leave out this driver, or ego.perception"
                 problems.append(Problem(str(file), "crossplay.egos", message, remedy))
             if scene is not None:
-                collect(problems, partial(driver.try_out, car_of(scene.world, EGO), False))
+                collect(problems, partial(driver.try_out, car.car_of(scene.world, EGO), False))
     return found
 
 

@@ -59,5 +59,5 @@ def empty_context(folder: Path) -> RunContext:
         folder=RunFolder(folder),
         document=document.model_construct(),
         ego_persona=persona.model_construct(name="anyone"),
-        personas={},
+        people={},
     )

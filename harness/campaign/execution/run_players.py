@@ -65,7 +65,7 @@ class RunPlayers:
             folder=folder,
             document=document,
             ego_persona=Persona.from_record(manifest["ego_persona"]),
-            personas={name: Persona.from_record(each) for name, each in manifest["persona_documents"].items()},
+            people={name: Persona.from_record(each) for name, each in manifest["persona_documents"].items()},
             ego_driver=driver,
             policies=policies or policies_of_run(folder.path, document.policies, manifest["hashes"]),
         )

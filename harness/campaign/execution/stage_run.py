@@ -14,20 +14,19 @@ import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
+from harness.campaign.campaign_players import CampaignPlayers
 from harness.campaign.plan.planned_drivers import External
 from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage, plays_with_errors
 from harness.campaign.preflight import OpenCampaign
-from harness.campaign.shipped_people import ShippedPerson
 from harness.campaign.storage.checksums import checksums_of, digest_of
 from harness.campaign.storage.locks import held_by_worker
 from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.run_log import logged_to
-from harness.config.campaign import Campaign
 from harness.config.persona import Persona
 from harness.drivers.external import ExternalDriver
 from harness.errors import HarnessError, is_of_memory, of_system, short_of_memory
@@ -45,24 +44,12 @@ process crashes, the place is known."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class RunContext:
+class RunContext(CampaignPlayers):
     """What all stages of a run share; small enough to be sent to another process."""
 
     folder: RunFolder
-    document: Campaign
-    ego_persona: Persona
-    personas: Mapping[str, Persona]
-    ego_driver: ExternalDriver | None = None
-    other_egos: Mapping[str, ExternalDriver] = field(default_factory=dict)
     roads: tuple[Path, ...] = ()
     """The folders of the scenes on whose roads the egos learn too."""
-    shipped: Mapping[str, tuple[ShippedPerson, ...]] = field(default_factory=dict)
-    """The shipped people of the scene and the roads, by the name of the scene, where the ego is retrained against
-    them."""
-    policies: Path | None = None
-    """The folder of the policies that another run trained."""
-    policy_drivers: Mapping[str, ExternalDriver] = field(default_factory=dict)
-    """The policies of others in that folder, by name."""
     keys: Mapping[str, str] = field(default_factory=dict)
     """The cache key of every stage."""
     keep_going: bool = False
@@ -70,7 +57,7 @@ class RunContext:
 
     def persona(self, name: str) -> Persona:
         """A persona of the campaign; the ego's own for the empty name."""
-        return self.personas[name] if name else self.ego_persona
+        return self.people[name] if name else self.ego_persona
 
     def external_driver(self, name: str = "") -> ExternalDriver:
         """An external driver of the campaign: its ego, or another one by name."""
@@ -108,20 +95,9 @@ def _opened(folder: Path, ego_type: str | None, files: str) -> OpenScene:
 def run_context_of(
     campaign: OpenCampaign, folder: RunFolder, keys: Mapping[str, str], keep_going: bool = False
 ) -> RunContext:
-    return RunContext(
-        folder=folder,
-        document=campaign.document,
-        ego_persona=campaign.ego_persona,
-        personas=campaign.people,
-        ego_driver=campaign.ego_driver,
-        other_egos=campaign.other_egos,
-        roads=tuple(each.folder for each in campaign.roads),
-        shipped=campaign.shipped,
-        policies=campaign.policies,
-        policy_drivers=campaign.policy_drivers,
-        keys=keys,
-        keep_going=keep_going,
-    )
+    players = {each.name: getattr(campaign, each.name) for each in fields(CampaignPlayers)}
+    roads = tuple(each.folder for each in campaign.roads)
+    return RunContext(**players, folder=folder, roads=roads, keys=keys, keep_going=keep_going)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -47,7 +47,7 @@ def factory(tmp_path: Path) -> PlayerFactory:
         folder=folder,
         document=Campaign.model_validate({"name": "a", "scene": "b", "personas": ["c"]}),
         ego_persona=read_document(CAREFUL, Persona),
-        personas=people,
+        people=people,
         policies=folder.policy("texting-seed1").parent,
     )
     return PlayerFactory(context=context, scene=open_scene(PAPER_MERGE))

@@ -54,7 +54,7 @@ def test_training__by_regret_is_given_the_naive_ego_and_its_table_has_the_regret
         folder=folder,
         document=campaign_of("speedy", retraining={"starts": starts}),
         ego_persona=read_document(CAREFUL, Persona),
-        personas={"speedy": read_document(SPEEDY, Persona)},
+        people={"speedy": read_document(SPEEDY, Persona)},
         keys={stage.id: "key"},
     )
     folder.begin(stage.id, "key")
