@@ -1,7 +1,8 @@
 """Reading of untrusted files, and atomic, durable writing of files.
 
 Only plain files of a limited size are read, never pipes. A file is written under a temporary name beside its final one
-and then renamed. A killed process leaves the temporary file behind; `drop_scratch` removes it.
+and then renamed; so is a folder that is to be complete. A killed process leaves the temporary file or folder behind;
+`drop_scratch` removes it.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import errno
 import hashlib
 import os
+import shutil
 import stat
 import tempfile
 from collections.abc import Collection, Iterator
@@ -16,9 +18,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
-from harness.errors import UsageError
+from harness.errors import UsageError, is_of_disk
 
 _SCRATCH = ".part"
+_NEW = "name a new folder"
 MOST_HASHED_BYTES = 2_000_000_000
 _BLOCK_BYTES = 1_000_000
 
@@ -60,9 +63,78 @@ def replace_durably(scratch: Path, path: Path) -> None:
 
 
 def drop_scratch(folder: Path) -> None:
-    """Remove the temporary files of killed processes in a folder and its subfolders."""
-    for scratch in folder.rglob(f".*{_SCRATCH}"):
-        scratch.unlink(missing_ok=True)
+    """Remove the temporary files and folders of killed processes in a folder and its subfolders."""
+    for scratch in list(folder.rglob(f".*{_SCRATCH}")):
+        if scratch.is_dir() and not scratch.is_symlink():
+            shutil.rmtree(scratch)
+        else:
+            scratch.unlink(missing_ok=True)
+
+
+@contextmanager
+def complete_folder(folder: Path, *, replaces: bool = False) -> Iterator[Path]:
+    """A scratch folder beside a folder, which gets what is in it if nothing is raised: until then it is as before.
+
+    The folder has to be new or empty, or is replaced.
+    """
+    scratch = _scratch_of(folder)
+    shutil.rmtree(scratch, ignore_errors=True)
+    scratch.mkdir()
+    try:
+        yield scratch
+        if replaces:
+            shutil.rmtree(folder, ignore_errors=True)
+        if folder.is_dir():  # it stays: a shell may be in it
+            for each in scratch.iterdir():
+                each.rename(folder / each.name)
+        else:
+            scratch.rename(folder)
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+
+
+@contextmanager
+def new_folder(folder: Path) -> Iterator[Path]:
+    """`complete_folder` for a new folder that a user names. Raises UsageError as `check_new_folder`, and if it can't be
+    written; what the block raises about other files stays as it is."""
+    check_new_folder(folder)
+    try:
+        with complete_folder(folder) as scratch:
+            yield scratch
+            check_new_folder(folder)  # somebody may have filled it meanwhile
+    except OSError as error:
+        named = error.filename if isinstance(error.filename, str | os.PathLike) else None
+        is_own = is_of_disk(error) if named is None else Path(named).is_relative_to(_scratch_of(folder))
+        if is_own or isinstance(error, shutil.Error):
+            raise UsageError.of(folder, "", *cannot_write(error)) from None
+        raise
+
+
+def _scratch_of(folder: Path) -> Path:
+    """The temporary folder of this process for a folder."""
+    return folder.absolute().with_name(f".{folder.absolute().name}.{os.getpid()}{_SCRATCH}")
+
+
+def cannot_write(error: OSError) -> tuple[str, str]:
+    """What is wrong with a folder that can't be written, and the remedy."""
+    reason = error.args[0][0][-1] if isinstance(error, shutil.Error) else error.strerror
+    return f"can't be written: {reason}", "name a folder that you may write"
+
+
+def no_folder(folder: Path) -> tuple[str, str]:
+    """That there is no folder, and the remedy."""
+    return f"there is no folder {folder}", "create it, or name another place"
+
+
+def check_new_folder(folder: Path) -> None:
+    """Raise UsageError unless a folder is new or empty, and the one that it is to be in is there."""
+    if folder.is_symlink() or folder.exists():
+        if not folder.is_dir():
+            raise UsageError.of(folder, "", "is a file, not a folder", _NEW)
+        if any(folder.iterdir()):
+            raise UsageError.of(folder, "", "is there already, and not empty", _NEW)
+    if not folder.absolute().parent.is_dir():
+        raise UsageError.of(folder, "", *no_folder(folder.absolute().parent))
 
 
 def check_new_file(file: Path, option: str = "") -> None:
@@ -73,7 +145,7 @@ def check_new_file(file: Path, option: str = "") -> None:
     if file.is_dir():
         raise UsageError.of(place, name, "is a folder", "name a file")
     if not file.absolute().parent.is_dir():
-        raise UsageError.of(place, name, f"there is no folder {file.parent}", "create it, or name another file")
+        raise UsageError.of(place, name, *no_folder(file.parent))
 
 
 def make_folder(folder: Path) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from harness.errors import UsageError
-from harness.files import check_new_file, content_of, digest_of_file, write_atomically
+from harness.files import check_new_file, content_of, digest_of_file, drop_scratch, new_folder, write_atomically
 
 
 def test_write_atomically__writes_and_replaces(tmp_path: Path) -> None:
@@ -40,6 +40,50 @@ def test_write_atomically__a_failure_leaves_only_the_old_file(tmp_path: Path, mo
 def test_write_atomically__a_missing_folder_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         write_atomically(tmp_path / "nowhere" / "table.csv", b"")
+
+
+def test_new_folder__fills_an_empty_folder_and_leaves_it_where_it_is(tmp_path: Path) -> None:
+    folder = tmp_path / "empty"
+    folder.mkdir()
+    before = folder.stat().st_ino
+    with new_folder(folder) as scratch:
+        (scratch / "a.txt").touch()
+        assert list(folder.iterdir()) == []
+    assert folder.stat().st_ino == before
+    assert list(tmp_path.rglob("*")) == [folder, folder / "a.txt"]
+
+
+def test_new_folder__that_somebody_fills_meanwhile_is_left_as_it_is(tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+
+    def fill(scratch: Path) -> None:
+        (scratch / "a.txt").touch()
+        folder.mkdir()
+        (folder / "a.txt").write_text("mine")
+
+    with pytest.raises(UsageError, match="is there already, and not empty"), new_folder(folder) as scratch:
+        fill(scratch)
+    assert [each.name for each in tmp_path.iterdir()] == ["out"]
+    assert (folder / "a.txt").read_text() == "mine"
+
+
+def test_new_folder__says_why_it_cannot_be_written(tmp_path: Path) -> None:
+    (tmp_path / "nowhere").symlink_to(tmp_path / "gone")
+    for name, message in (
+        ("nowhere", "is a file, not a folder"),
+        ("no/out", "there is no folder"),
+        ("x" * 255, "can't"),
+    ):
+        with pytest.raises(UsageError, match=message), new_folder(tmp_path / name):
+            pass
+
+
+def test_drop_scratch__removes_files_and_folders_of_killed_processes(tmp_path: Path) -> None:
+    (tmp_path / "a" / ".b.1.part" / ".c.part").mkdir(parents=True)
+    (tmp_path / "a" / ".d.part").touch()
+    (tmp_path / "a" / ".link.part").symlink_to(tmp_path)
+    drop_scratch(tmp_path)
+    assert list(tmp_path.rglob("*")) == [tmp_path / "a"]
 
 
 def test_check_new_file__wants_a_folder_that_is_there_and_a_file(tmp_path: Path) -> None:

@@ -21,14 +21,6 @@ def reading(file: Path) -> str:
     return f"reading {escape(str(file))}"
 
 
-def cannot_write(error: OSError) -> tuple[str, str]:
-    return f"can't be written: {error.strerror}", "name a folder that you may write"
-
-
-def no_folder(folder: Path) -> tuple[str, str]:
-    return f"there is no folder {folder}", "create it, or name another file"
-
-
 def rows_left_out(number: int, what: str) -> str:
     return f"{number} more {what} are not listed: choose some with --near EDGE and --within M, or give a larger --rows"
 

@@ -14,14 +14,13 @@ from typing import Any, Literal
 from pydantic import TypeAdapter, ValidationError
 
 from harness.campaign.plan.plan import plan
-from harness.cli import messages
 from harness.config.campaign import Campaign, CampaignName
 from harness.config.json_schema import file_of, schema_of, term_in_words, unit_of
 from harness.config.persona import Persona
 from harness.config.scene import Name
 from harness.config.toml_reading import parse_toml, read_document
 from harness.errors import Problem, UsageError
-from harness.files import check_new_file, write_atomically
+from harness.files import check_new_file, new_folder, write_atomically
 from harness.game.payoff_terms import FUZZY_QUANTITIES, TERMS
 from harness.reports.page_template import environment_of
 from harness.shipped_documents import shipped
@@ -82,27 +81,23 @@ def toml(value: Any) -> str:
 
 
 def create_project(folder: Path) -> list[Path]:
-    """Write the files of a new project and return their paths. `folder` must not exist, or be empty.
+    """Write the files of a new project and return their paths. `folder` must not exist, or be empty; it gets all files
+    or none.
 
     The campaign is named after the folder. Raises UsageError if the folder holds files, its name is not that of a
     campaign, or it can't be written.
     """
     name = folder.absolute().name
     check_name(name, "campaign")
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise UsageError.of(folder, "", "is there already, and not empty", "name a new folder")
-    if not folder.absolute().parent.is_dir():
-        raise UsageError.of(folder, "", *messages.no_folder(folder.absolute().parent))
-    try:
-        (folder / "personas").mkdir(parents=True)
-        shutil.copytree(shipped("networks") / SCENE, folder / "networks" / SCENE)
-        persona = create_persona(PERSONA, folder / "personas" / f"{PERSONA}.toml")
+    persona, scene = Path("personas", f"{PERSONA}.toml"), Path("networks", SCENE)
+    with new_folder(folder) as made:
+        (made / persona.parent).mkdir()
+        shutil.copytree(shipped("networks") / SCENE, made / scene)
+        create_persona(PERSONA, made / persona)
         for file, template in _TEMPLATES.items():
             text = rendered(template, folder=name, persona=PERSONA, scene=SCENE)
-            write_atomically(folder / file, text.encode())
-    except OSError as error:
-        raise UsageError.of(folder, "", *messages.cannot_write(error)) from None
-    return [folder / "campaign.toml", folder / "networks" / SCENE / "scene.toml", persona, folder / "README.md"]
+            write_atomically(made / file, text.encode())
+    return [folder / each for each in ("campaign.toml", scene / "scene.toml", persona, "README.md")]
 
 
 def create_persona(name: str, out: Path | None = None) -> Path:

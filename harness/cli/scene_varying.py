@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Mapping, Sequence
 from math import degrees, radians
@@ -14,12 +13,11 @@ import numpy as np
 import tomli_w
 
 from harness.assessment.route_trial import check_routes
-from harness.cli import messages
 from harness.cli.new_documents import check_free
 from harness.config.scene import SCENE_FILE
 from harness.config.toml_reading import parse_toml
 from harness.errors import Problem, UsageError
-from harness.files import scratch_beside
+from harness.files import new_folder
 from harness.game.roles import EGO
 from harness.maps.varied_road import RoadVariation, Warp, vary_net, vary_route_file, warp_of
 from harness.road.net.network import lane_line, read_net
@@ -72,14 +70,8 @@ def write_variant(scene: OpenScene, seed: int, out: Path) -> VariedScene:
             except UsageError as error:
                 problems.append("; ".join(problem.message for problem in error.problems))
                 continue
-            copy = scratch_beside(out / name)
-            try:
-                shutil.copytree(folder, copy)
-                os.rename(copy, out / name)
-            except OSError as error:
-                raise UsageError.of(out, "", *messages.cannot_write(error)) from None
-            finally:
-                shutil.rmtree(copy, ignore_errors=True)
+            with new_folder(out / name) as copy:
+                shutil.copytree(folder, copy, dirs_exist_ok=True)
             return VariedScene(out / name, variation, tuple(problems))
     message = f"none of {_ATTEMPTS} roads of seed {seed} can be driven: {problems[-1]}"
     raise UsageError.of(scene.folder, "", message, "choose another --seed, or another scene")

@@ -14,10 +14,9 @@ from xml.etree import ElementTree
 from markupsafe import Markup
 
 from harness.assessment.route_trial import check_routes
-from harness.cli import messages
 from harness.cli.new_documents import check_free, check_name, rendered
 from harness.errors import Problem, UsageError, plain
-from harness.files import make_folder, scratch_beside, write_atomically
+from harness.files import cannot_write, make_folder, no_folder, scratch_beside, write_atomically
 from harness.maps.candidates import CandidateKind
 from harness.maps.game_plans import GamePlan
 from harness.maps.map_traffic import SceneTraffic, scene_traffic
@@ -47,7 +46,7 @@ def check_new(name: str, names: Sequence[str], out: Path) -> None:
     """Raise UsageError if scenes and campaigns of these names can't be written to a folder."""
     check_name(name, "scene")
     if not out.is_dir():
-        raise UsageError.of("--out", str(out), *messages.no_folder(out))
+        raise UsageError.of("--out", str(out), *no_folder(out))
     paths = (path for each in names for path in files_of(each, out))
     check_free(paths, "choose another NAME, or --out another folder")
 
@@ -87,7 +86,7 @@ def write_scenes(
         try:
             _put(opened, ready, out)
         except OSError as error:
-            raise UsageError.of(out, "", *messages.cannot_write(error)) from None
+            raise UsageError.of(out, "", *cannot_write(error)) from None
     return {name: plan for name, (_, plan) in ready.items()}, problems
 
 

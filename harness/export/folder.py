@@ -8,10 +8,7 @@ NN_tracks.csv and so on   the layout of highD, with a number per game
 
 from __future__ import annotations
 
-import os
-import shutil
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -23,9 +20,8 @@ from harness.export.exported_game import ExportedGame
 from harness.export.highd import highd_tables
 from harness.export.lane_courses import LaneCourses
 from harness.export.opendrive import ROAD_FILE, road_file
+from harness.files import check_new_folder, new_folder
 from harness.road.scene.open_scene import OpenScene
-
-_NEW = "name a new folder"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,13 +39,7 @@ def check_export(folder: Path, formats: Formats) -> None:
     if formats.openscenario and find_spec("scenariogeneration") is None:
         message = "needs scenariogeneration, which is not installed"
         raise UsageError.of("--openscenario", "", message, "pip install 'safedriverl-harness[osc]'")
-    if folder.is_symlink() or folder.exists():
-        if not folder.is_dir():
-            raise UsageError.of(folder, "", "is a file, not a folder", _NEW)
-        if any(folder.iterdir()):
-            raise UsageError.of(folder, "", "is there already, and not empty", _NEW)
-    if not folder.absolute().parent.is_dir():
-        raise UsageError.of(folder, "", f"there is no folder {folder.absolute().parent}", "create it")
+    check_new_folder(folder)
 
 
 def write_games(
@@ -68,7 +58,7 @@ def write_games(
     before.
     """
     check_export(folder, formats)
-    with _complete(folder) as partial:
+    with new_folder(folder) as partial:
         road = road_file(scene.net_file, title) if formats.opendrive else None
         courses = LaneCourses.read(scene.net_file) if formats.csv else None
         if road is not None:
@@ -87,21 +77,3 @@ def write_games(
         table = pd.DataFrame(rows, columns=["number", "name", "arm", "seed", "episode", "outcome"])
         table.to_csv(partial / "games.csv", index=False, lineterminator="\n")
     return len(rows)
-
-
-@contextmanager
-def _complete(folder: Path) -> Iterator[Path]:
-    """A scratch folder beside a folder, whose place it takes if nothing is raised."""
-    partial = folder.absolute().with_name(f".{folder.absolute().name}.{os.getpid()}.partial")
-    shutil.rmtree(partial, ignore_errors=True)
-    try:
-        partial.mkdir()
-        yield partial
-        if folder.is_dir():
-            folder.rmdir()
-        partial.rename(folder)
-    except OSError as error:
-        remedy = "name a folder that you may write"
-        raise UsageError.of(folder, "", f"can't be written: {error.strerror}", remedy) from None
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)

@@ -9,8 +9,6 @@ view.xml           zoom, speed, and the halts at contacts and at the end
 
 from __future__ import annotations
 
-import os
-import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
@@ -18,6 +16,7 @@ from xml.etree import ElementTree
 
 import pandas as pd
 
+from harness.files import complete_folder
 from harness.game.arrays import FloatArray
 from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles
 from harness.replay.contacts import contacts
@@ -58,10 +57,7 @@ def write_replay(
     view = choose_view(trace, touches)
 
     folder.parent.mkdir(parents=True, exist_ok=True)
-    partial = folder.with_name(f".{folder.name}.{os.getpid()}.partial")
-    shutil.rmtree(partial, ignore_errors=True)
-    partial.mkdir()
-    try:
+    with complete_folder(folder, replaces=True) as partial:
         (partial / "scene.net.xml").write_bytes(xml_bytes(net_file))
         shown_title = f"{title}   {legend(trace, names)}"
         added = scenery(types=types, rails=rails, touches=touches, view=view, title=shown_title)
@@ -81,10 +77,6 @@ def write_replay(
         # Without an end SUMO would never stop. At the end SUMO-GUI asks a question in front of the picture; the end is
         # a step beyond the last halt, so that the picture stays free until the user presses the play button.
         write_xml(_configuration(title, halts_s[-1] + 2 * step_length_s, step_length_s), partial / "scene.sumocfg")
-        shutil.rmtree(folder, ignore_errors=True)
-        partial.rename(folder)
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)
 
 
 def _configuration(title: str, end_s: float, step_length_s: float) -> ElementTree.Element:

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from harness.campaign.preflight import open_campaign
+from harness.cli import new_documents
 from harness.cli.new_documents import create_project
 from harness.errors import UsageError
 
@@ -36,3 +37,18 @@ def test_create_project__a_folder_with_files_is_not_touched(tmp_path: Path) -> N
     with pytest.raises(UsageError, match="not empty"):
         create_project(tmp_path / "lab")
     assert [each.name for each in (tmp_path / "lab").iterdir()] == ["mine.txt"]
+
+
+@pytest.mark.parametrize("is_there", [False, True])
+def test_create_project__without_room_for_all_files_there_are_none(
+    is_there: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(path: Path, content: bytes) -> None:
+        raise OSError(28, "No space left on device", str(path))
+
+    if is_there:
+        (tmp_path / "lab").mkdir()
+    monkeypatch.setattr(new_documents, "write_atomically", full)
+    with pytest.raises(UsageError, match="lab: can't be written: No space left"):
+        create_project(tmp_path / "lab")
+    assert list(tmp_path.rglob("*")) == [tmp_path / "lab"] * is_there

@@ -53,6 +53,18 @@ def test_folder__nothing_is_left_of_an_export_that_fails(merge: OpenScene, tmp_p
     assert list(tmp_path.iterdir()) == []
 
 
+def test_folder__a_trace_that_cannot_be_read_is_not_taken_for_a_folder_that_cannot_be_written(
+    merge: OpenScene, tmp_path: Path
+) -> None:
+    def unreadable() -> Iterator[ExportedGame]:
+        yield exported(clean_game(), merge, "first")
+        raise PermissionError(13, "Permission denied", "traces/naive_alone-seed1.parquet")
+
+    with pytest.raises(PermissionError, match="naive_alone-seed1"):
+        write_games(unreadable(), merge, tmp_path / "out", BOTH, title="unreadable")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_formats__name_the_package_that_is_missing(
     merge: OpenScene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
