@@ -14,15 +14,17 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import Field, ValidationError
 from safetensors import SafetensorError
 from safetensors.numpy import load as load_tensors
 from safetensors.numpy import save as save_tensors
 
 from harness.config.persona import Persona
-from harness.config.toml_reading import nearest
+from harness.config.scene import Share
+from harness.config.toml_reading import Excerpt, nearest
 from harness.config.traits import NO_TRAIT
 from harness.errors import UsageError
 from harness.files import content_of, make_folder, write_atomically
@@ -36,6 +38,37 @@ _MAX_TENSOR_BYTES, _MAX_CARD_BYTES = 100_000_000, 1_000_000
 _MAX_PARAMETER = 1e6  # a larger parameter is a sign of damage
 _LAYER = re.compile(r"(actor|critic)\.(\d{1,2})\.", re.ASCII)
 _POLICY_FOLDER = "name the folder of a policy, as under <run>/policies/"
+_Text = Annotated[str, Field(max_length=200)]
+_Stages = Annotated[str, Field(max_length=1000)]
+
+
+class PolicyCard(Excerpt):
+    """What `policy.json` says about how a policy learned; None: it does not say."""
+
+    player: Literal["ego", "non_ego"] | None = None
+    persona: _Text | None = None
+    persona_sha256: _Text | None = None
+    scene: _Text | None = None
+    roads: tuple[_Text, ...] = ()
+    """Further scenes on which it learned."""
+    step_s: float | None = None
+    friction: tuple[float, float] | None = None
+    """The range of the games' coefficients of friction."""
+    cars: tuple[dict[_Text, float], ...] = ()
+    """The limits of the actuators of each car that it drove; empty: it does not say."""
+    against: _Stages | None = None
+    selected: _Stages | None = None
+    """The training whose policy a selection chose."""
+    began_from: _Stages | None = None
+    learned_in: _Stages | None = None
+    """The training of several personas from which it is derived."""
+    learned_with: Annotated[tuple[_Text, ...], Field(max_length=50)] = ()
+    alone_share: Share | None = None
+    """The share of its games without the opponent."""
+    attentive_share: Share | None = None
+    """The share of its budget without lapses of attention."""
+    training: dict[str, bool | int | float | str | list[int] | None] | None = None
+    """Its settings."""
 
 
 @dataclass(frozen=True)
@@ -139,11 +172,16 @@ def read_card(folder: Path) -> dict[str, Any]:
     """The content of a policy's JSON. Raises UsageError if it is missing or damaged."""
     file = policy_files(folder)[0]
     try:
-        card = json.loads(_content(file, _MAX_CARD_BYTES).decode("utf-8"))
+        content = _content(file, _MAX_CARD_BYTES).decode("utf-8")
+        card = json.loads(content)
         if not isinstance(card, dict):
             raise TypeError("it contains no JSON object")
         if missing := [key for key in ("format", "observation") if key not in card]:
             raise ValueError(f"it has no {missing[0]!r}")
+        PolicyCard.model_validate_json(content)
+    except ValidationError as error:
+        key, words = ".".join(map(str, error.errors()[0]["loc"])), error.errors()[0]["msg"]
+        raise UsageError.of(file, key, f"is damaged: {words}", "train the policy again") from None
     except (ValueError, LookupError, TypeError, RecursionError) as error:
         raise UsageError.of(file, "", f"is damaged: {error}", "train the policy again") from None
     return card

@@ -8,15 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any
-
-from pydantic import ConfigDict, Field, ValidationError
+from typing import Any
 
 from harness.config.persona import Persona
 from harness.config.scene import Scene
-from harness.config.toml_reading import Document
 from harness.drivers.car import car_of
-from harness.drivers.policy_file import persona_hash, policy_files, read_card
+from harness.drivers.policy_file import PolicyCard, persona_hash, policy_files, read_card
 from harness.errors import UsageError
 from harness.game.roles import EGO, NON_EGO, ROLES
 from harness.game.world import World
@@ -24,24 +21,6 @@ from harness.game.world import World
 _UNITS = {"max_acceleration_mps2": "m/s²", "max_braking_mps2": "m/s²", "max_steering_rad": "rad"}
 """The limits of which pedals, wheel and observed angles are shares."""
 _MOST_NAMED = 3
-_Text = Annotated[str, Field(max_length=200)]
-
-
-class Origin(Document):
-    """What the card of a policy says about the games in which it learned; None: it does not say."""
-
-    model_config = ConfigDict(extra="ignore")
-    player: _Text | None = None
-    persona: _Text | None = None
-    persona_sha256: _Text | None = None
-    scene: _Text | None = None
-    roads: tuple[_Text, ...] = ()
-    """Further scenes on which it learned."""
-    step_s: float | None = None
-    friction: tuple[float, float] | None = None
-    """The range of the games' coefficients of friction."""
-    cars: tuple[dict[_Text, float], ...] = ()
-    """The limits of the actuators of each car that it drove; empty: it does not say."""
 
 
 def origin_card(scene: Scene, world: World, player: int) -> dict[str, Any]:
@@ -56,11 +35,7 @@ def other_games(folder: Path, scene: Scene, world: World, *, player: int, person
     The policy drives as the ego (`player` is 0) or as a person, with the payoff of `persona` where it is given. Raises
     UsageError if its card is damaged, or if it learned with a car of other actuators.
     """
-    try:
-        origin = Origin.from_record(read_card(folder))
-    except ValidationError as error:
-        key, words = ".".join(map(str, error.errors()[0]["loc"])), error.errors()[0]["msg"]
-        raise UsageError.of(policy_files(folder)[0], key, words, "train the policy again") from None
+    origin = PolicyCard.from_record(read_card(folder))
     for car in _cars(world, player) if origin.cars else ():
         if car not in origin.cars:
             message = f"it learned with {_of_car(origin.cars[0])}, and the {ROLES[player]} of scene {scene.name} has "
