@@ -59,8 +59,9 @@ def sources(environment: Environment, names: Sequence[str]) -> Markup:
 def served_page(page: str, games: Sequence[Sequence[Any]], run: str) -> str:
     """The page as a server sends it: with a list of the games that it may fetch from there as `games/KEY.json`.
 
-    `games` have arm, persona, seed, episode, outcome and least time to collision (s, None: none). Raises UsageError for
-    another page; `run` is the folder that the message names.
+    `games` have arm, persona, seed, episode, outcome, least time to collision (s, None: none), the cause of a failure,
+    severity and delta-v (m/s, None: none). Raises UsageError for another page; `run` is the folder that the message
+    names.
     """
     empty = ELSEWHERE.format("[]")
     if CONTENT_POLICY not in page or empty not in page:

@@ -21,8 +21,12 @@ function normal(key) {
 
 const games = new Map(recorded.games.map(game => [keyOf(game), game]));
 // Games that `harness serve` sends when they are first opened; the page as a file knows none.
-for (const [arm, persona, seed, episode, outcome, leastTime] of JSON.parse(document.getElementById("elsewhere").textContent)) {
-  const game = { arm, persona, seed, episode, outcome, leastTime, isElsewhere: true, players: [], background: [], touches: [], marks: [] };
+const elsewhere = JSON.parse(document.getElementById("elsewhere").textContent);
+for (const [arm, persona, seed, episode, outcome, leastTime, cause, severity, deltaV] of elsewhere) {
+  const game = {
+    arm, persona, seed, episode, outcome, leastTime, cause, severity, deltaV,
+    isElsewhere: true, players: [], background: [], touches: [], marks: [],
+  };
   if (!games.has(keyOf(game))) games.set(keyOf(game), game);
 }
 const severalSeeds = new Set([...games.values()].map(game => game.seed)).size > 1;

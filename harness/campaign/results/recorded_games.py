@@ -138,7 +138,7 @@ def tracks_of(trace: pd.DataFrame, scene: OpenScene, game: Any, takeover: pd.Dat
         steps=int(trace["step"].max()),
         outcome=judged(game._asdict())[1],
         severity=float(np.nan_to_num(game.severity)),
-        delta_v_mps=_delta_v_mps(game),
+        delta_v_mps=delta_v_of(game),
         players=players,
         background=[
             _track(name, piece, types[name], of_background)
@@ -151,7 +151,7 @@ def tracks_of(trace: pd.DataFrame, scene: OpenScene, game: Any, takeover: pd.Dat
     )
 
 
-def _delta_v_mps(game: Any) -> float | None:
+def delta_v_of(game: Any) -> float | None:
     """The greater change of velocity in the collision of a row of `episodes`; None without one."""
     known = [each for each in (game.ego_delta_v_mps, game.other_delta_v_mps) if np.isfinite(each)]
     return max(known, default=None)
