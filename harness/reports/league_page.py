@@ -14,6 +14,7 @@ from harness.evaluation.league_columns import SUMO_DRIVER, UNTRAINED
 from harness.reports.failure_table import ORDINARY, FailureCell
 from harness.reports.numbers import NO_SPACE, interval, number, percent
 from harness.reports.page_template import environment_of
+from harness.reports.run_tables import failures, failures_of, played
 from harness.reports.severity_wording import RISK_TONES, risk_tone
 
 if TYPE_CHECKING:
@@ -80,7 +81,7 @@ def league_terminal(table: pd.DataFrame) -> Table:
     for row in table.head(12).to_dict("records"):
         style = "dim" if row["reason"] else "red" if row["failure_rate"] > _MUCH else None
         scene, person, _, span, preventable, *_ = _texts(row)
-        shown.add_row(scene, person, _counts(row), span, preventable, style=style)
+        shown.add_row(scene, person, failures_of(row), span, preventable, style=style)
     return shown
 
 
@@ -103,7 +104,7 @@ def sentence_of(row: Mapping[Any, Any]) -> str:
     low, high = row["failure_rate_low"], row["failure_rate_high"]
     who = f"against {person_in_words(row['person'])} in {row['scene']}"
     rate = f"{percent(row['failure_rate'])} (95 %: {interval(low, high)})"
-    fails = f"{with_shield(row['ego'], row['shield'])} fails in {_counts(row)} games {who}: {rate}."
+    fails = f"{with_shield(row['ego'], row['shield'])} fails in {failures_of(row)} games {who}: {rate}."
     return f"{fails} Not answered: {row['reason']}." if row["reason"] else fails
 
 
@@ -113,30 +114,22 @@ def person_in_words(person: str) -> str:
 
 
 def _cell(row: Mapping[Any, Any], address: str) -> FailureCell:
-    collisions, played = row["collisions"], row["episodes"] - row["errors"]
-    injured = row["serious_injuries"] * played
-    risk = injured / collisions if injured > 0.0 and collisions > 0 else math.nan
+    injured = row["serious_injuries"] * played(row)
+    risk = injured / row["collisions"] if injured > 0.0 and row["collisions"] > 0 else math.nan
+    copes = played(row) and not failures(row) and not row["reason"]
     return FailureCell(
         rate=percent(row["failure_rate"]),
-        counts=_counts(row),
+        counts=failures_of(row),
         spans=(),
-        tone=risk_tone(risk) if _failures(row) and not row["reason"] else "none",
+        tone="none" if copes else risk_tone(math.nan if row["reason"] else risk),
         game=address,
     )
-
-
-def _failures(row: Mapping[Any, Any]) -> int:
-    return int(sum(row[each] for each in ("collisions", "rails", "timeouts") if row[each] == row[each]))
-
-
-def _counts(row: Mapping[Any, Any]) -> str:
-    return f"{_failures(row)} of {row['episodes'] - row['errors']}"
 
 
 def _texts(row: Mapping[Any, Any]) -> Iterator[str]:
     yield with_shield(row["scene"], row["shield"])
     yield person_in_words(row["person"]) + ("" if row["person"] in UNTRAINED else f", seed {row['seed']}")
-    yield f"{percent(row['failure_rate'])} ({_counts(row)})"
+    yield f"{percent(row['failure_rate'])} ({failures_of(row)})"
     yield interval(row["failure_rate_low"], row["failure_rate_high"])
     yield percent(row["preventable_rate"])
     yield number(100.0 * row["serious_injuries"], 1)

@@ -281,8 +281,8 @@ def played(row: Row | None) -> int:
 
 
 def failures(row: Row) -> int:
-    """How many games of the arm the ego failed."""
-    return int(row["collisions"] + row["rails"] + row["timeouts"])
+    """How many games of the arm the ego failed; 0 where no game with an ego could be played."""
+    return sum(int(row[each]) for each in ("collisions", "rails", "timeouts") if pd.notna(row[each]))
 
 
 def failures_of(row: Row) -> str:
