@@ -73,6 +73,8 @@ class MapFacts:
         if self.says_left:
             return "has the tag driving_side=left"
         (south, west), (north, east) = self.lowest_deg, self.highest_deg
+        if south > north:  # a file without nodes lies nowhere
+            return ""
         ends = zip(_ISLES_DEG, (0.0, 1.0, 1.78), strict=True)
         inside = any(low <= south and north <= 61.0 and west >= -10.8 and east <= end for low, end in ends)
         return "lies in Great Britain or Ireland" if inside else ""
