@@ -72,7 +72,8 @@ def write_games(
         road = road_file(scene.net_file, title) if formats.opendrive else None
         courses = LaneCourses.read(scene.net_file) if formats.csv else None
         if road is not None:
-            (partial / ROAD_FILE).write_bytes(road.xml)
+            with _writing(folder):
+                (partial / ROAD_FILE).write_bytes(road.xml)
         rows = []
         for number, game in enumerate(games, start=1):
             files = highd_tables(game, number, courses) if courses is not None else {}
@@ -80,12 +81,14 @@ def write_games(
                 from harness.export.openscenario import scenario_file
 
                 files[f"{game.name}.xosc"] = scenario_file(game, road)
-            for name, content in files.items():
-                (partial / name).write_bytes(content)
+            with _writing(folder):
+                for name, content in files.items():
+                    (partial / name).write_bytes(content)
             rows.append((number, game.name, game.arm, game.seed, game.episode, game.outcome))
             on_game(number)
         table = pd.DataFrame(rows, columns=["number", "name", "arm", "seed", "episode", "outcome"])
-        table.to_csv(partial / "games.csv", index=False, lineterminator="\n")
+        with _writing(folder):
+            table.to_csv(partial / "games.csv", index=False, lineterminator="\n")
     return len(rows)
 
 
@@ -95,13 +98,22 @@ def _complete(folder: Path) -> Iterator[Path]:
     partial = folder.absolute().with_name(f".{folder.absolute().name}.{os.getpid()}.partial")
     shutil.rmtree(partial, ignore_errors=True)
     try:
-        partial.mkdir()
+        with _writing(folder):
+            partial.mkdir()
         yield partial
-        if folder.is_dir():
-            folder.rmdir()
-        partial.rename(folder)
+        with _writing(folder):
+            if folder.is_dir():
+                folder.rmdir()
+            partial.rename(folder)
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
+
+
+@contextmanager
+def _writing(folder: Path) -> Iterator[None]:
+    """Raises UsageError about the folder where its files can't be written."""
+    try:
+        yield
     except OSError as error:
         remedy = "name a folder that you may write"
         raise UsageError.of(folder, "", f"can't be written: {error.strerror}", remedy) from None
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)

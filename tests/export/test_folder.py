@@ -53,6 +53,28 @@ def test_folder__nothing_is_left_of_an_export_that_fails(merge: OpenScene, tmp_p
     assert list(tmp_path.iterdir()) == []
 
 
+def test_folder__an_error_of_reading_a_game_is_not_one_of_writing(merge: OpenScene, tmp_path: Path) -> None:
+    def unreadable() -> Iterator[ExportedGame]:
+        yield exported(clean_game(), merge, "first")
+        raise FileNotFoundError(2, "No such file", "traces.parquet")
+
+    with pytest.raises(FileNotFoundError, match=r"traces\.parquet"):
+        write_games(unreadable(), merge, tmp_path / "out", BOTH, title="broken")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_folder__that_can_not_be_written_is_named(
+    merge: OpenScene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(file: Path, content: bytes) -> int:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(UsageError, match="out: can't be written: No space left on device"):
+        write_games(games(merge), merge, tmp_path / "out", Formats(csv=True), title="two games")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_formats__name_the_package_that_is_missing(
     merge: OpenScene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
