@@ -115,6 +115,7 @@ class Comparison:
                 ],
                 transitions=[(each, list(_changed(each))) for each in self.transitions],
                 different_starts=DIFFERENT_STARTS,
+                relevant_mps=RELEVANT_SPEED_MPS,
                 several_seeds=len({row.found.seed for each in self.transitions for row in each.rows}) > 1,
             )
         )

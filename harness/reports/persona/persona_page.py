@@ -26,7 +26,7 @@ _LINES = ("-", "--", ":", "-.")
 
 
 def render_profile(profile: PersonaProfile) -> str:
-    """The page as text. Equal portraits give equal pages."""
+    """The page as text. Equal profiles give equal pages."""
     functions = []
     for k, each in enumerate(profile.functions, 1):
         words = function_in_words(each)
