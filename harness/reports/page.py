@@ -10,7 +10,7 @@ from harness.reports.acceptance_wording import acceptance_lines, by_sentence, he
 from harness.reports.arm_figures import MOST_DOTS
 from harness.reports.arm_glossary import glossary
 from harness.reports.attribution_section import attribution_section
-from harness.reports.cards import CAUTION, card
+from harness.reports.cards import card
 from harness.reports.data_table import table
 from harness.reports.differences import METRIC_WORDS, effect
 from harness.reports.embedding import GameTracks, embedded_games, recorded_document
@@ -87,7 +87,6 @@ def render_page(
         next_steps=steps,
         cards=[card(persona, place, tables, links, scene, paths) for place, persona in enumerate(tables.personas, 1)],
         most_dots=MOST_DOTS if tables.episodes.groupby("arm").size().max() > MOST_DOTS else 0,
-        caution=CAUTION,
         metrics={metric: words.name for metric, words in METRIC_WORDS.items()},
         effect=effect,
         planned=planned_in_words(tables),

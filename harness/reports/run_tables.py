@@ -11,7 +11,7 @@ import pandas as pd
 
 from harness.config.campaign import LEARNED, ego_called
 from harness.evaluation.comparisons.acceptance_checks import Check
-from harness.evaluation.comparisons.preventability import by_regulation, sentences_of
+from harness.evaluation.comparisons.preventability import by_regulation
 from harness.evaluation.game_theory.findings import GameFindings
 from harness.evaluation.rule_book.causes import cause_lines
 from harness.evaluation.start_space import Boundary
@@ -253,10 +253,6 @@ class RunTables:
     def prevented_in(self, arm: str) -> list[Mapping[Any, Any]]:
         """What the driver of the regulation prevents in an arm: the rows of preventability.csv, by training seed."""
         return by_regulation(self.preventability, arm)
-
-    def preventability_of(self, arm: str) -> dict[int, list[str]]:
-        """What reference drivers prevent in an arm in words, by training seed."""
-        return sentences_of(self.preventability, self.reference_drivers, arm)
 
     def who(self, persona: str) -> str:
         """What the ego meets, if it is not one driver with a persona; else empty."""
