@@ -44,7 +44,6 @@ def card(
     that an ego fails, on the road `scene`."""
     is_changed, figures = bool(tables.asked("RQ2", persona)), key_figures(persona, tables)
     columns = _columns(persona, is_changed, tables, links)
-    tests = [row for row in tables.comparisons.to_dict("records") if row["persona"] == persona]
     labels = {columns[0].arm: f"{tables.naive}, alone", columns[2].arm: f"{tables.naive}, against {persona}"}
     labels |= {each.arm: f"{tables.change.made} ego, against {persona}" for each in columns[3:]}
     failed = {arm: tables.counts_of(arm)[0] for arm in labels}
@@ -66,8 +65,8 @@ def card(
         "key_figures": figures,
         "statistics": [
             f"{row['question']}{', seed ' + str(row['seed']) if tables.several_seeds else ''}. {statistics(row)}"
-            for row in tests
-            if row["p_value"] == row["p_value"]
+            for row in tables.comparisons.to_dict("records")
+            if row["persona"] == persona and row["p_value"] == row["p_value"]
         ]
         + [
             over_trainings_statistics(row)
@@ -92,7 +91,6 @@ def card(
             _alternative(SPREADS, columns, "min_ttc_s", lambda time: f"least time {number(time, 1)} s"),
         ),
         "facts": _facts(persona, tables),
-        "tests": tests,
     }
 
 

@@ -12,7 +12,6 @@ from harness.reports.arm_glossary import glossary
 from harness.reports.attribution_section import attribution_section
 from harness.reports.cards import card
 from harness.reports.data_table import table
-from harness.reports.differences import METRIC_WORDS, effect
 from harness.reports.embedding import GameTracks, embedded_games, recorded_document
 from harness.reports.failing_paths import FailingPath, worst_figures
 from harness.reports.failure_table import failure_table
@@ -87,8 +86,6 @@ def render_page(
         next_steps=steps,
         cards=[card(persona, place, tables, links, scene, paths) for place, persona in enumerate(tables.personas, 1)],
         most_dots=MOST_DOTS if tables.episodes.groupby("arm").size().max() > MOST_DOTS else 0,
-        metrics={metric: words.name for metric, words in METRIC_WORDS.items()},
-        effect=effect,
         planned=planned_in_words(tables),
         embedded=texts,
         left=len(tables.played) - len(texts),
