@@ -13,7 +13,7 @@ from harness.evaluation.comparisons.tied_ranks import with_shield
 from harness.evaluation.league_columns import SUMO_DRIVER, UNTRAINED
 from harness.reports.failure_table import ORDINARY, FailureCell
 from harness.reports.numbers import NO_SPACE, interval, number, percent
-from harness.reports.page_template import environment_of
+from harness.reports.page_template import page_of
 from harness.reports.run_tables import failures, failures_of, played
 from harness.reports.severity_wording import RISK_TONES, risk_tone
 
@@ -38,25 +38,22 @@ def render_league(ego: str, table: pd.DataFrame, addresses: Sequence[str], faile
     for row, address in zip(rows, addresses, strict=True):
         people = met.setdefault((row["scene"], row["shield"]), {})
         people.setdefault(row["person"], []).append(_cell(row, address))
-    return (
-        environment_of("reports")
-        .get_template("league.html.jinja")
-        .render(
-            ego=ego,
-            scenes=len(scenes),
-            games=int(table["episodes"].sum() - table["errors"].sum()),
-            columns=[person_in_words(each) for each in UNTRAINED],
-            lines=[
-                (with_shield(*line), [met[line].get(each, []) for each in UNTRAINED], _people(met[line]))
-                for line in product(scenes, shields)
-                if line in met
-            ],
-            headings=HEADINGS,
-            tones=RISK_TONES,
-            rows=[(address, list(_texts(row))) for row, address in zip(rows, addresses, strict=True)],
-            failed=failed,
-            not_answered=not_answered(table),
-        )
+    return page_of(
+        "league",
+        ego=ego,
+        scenes=len(scenes),
+        games=int(table["episodes"].sum() - table["errors"].sum()),
+        columns=[person_in_words(each) for each in UNTRAINED],
+        lines=[
+            (with_shield(*line), [met[line].get(each, []) for each in UNTRAINED], _people(met[line]))
+            for line in product(scenes, shields)
+            if line in met
+        ],
+        headings=HEADINGS,
+        tones=RISK_TONES,
+        rows=[(address, list(_texts(row))) for row, address in zip(rows, addresses, strict=True)],
+        failed=failed,
+        not_answered=not_answered(table),
     )
 
 

@@ -22,7 +22,7 @@ from harness.reports.learning import learning, searches, stopped
 from harness.reports.manoeuvres import causes_by_game, failures_by_cause, marks_of
 from harness.reports.next_steps import next_steps
 from harness.reports.page_header import header, troubles
-from harness.reports.page_template import CONTENT_POLICY, ELSEWHERE, LIBRARIES, SCRIPTS, environment_of, sources
+from harness.reports.page_template import CONTENT_POLICY, ELSEWHERE, LIBRARIES, SCRIPTS, page_of, sources
 from harness.reports.provenance import asked_alone
 from harness.reports.run_tables import RunTables
 from harness.reports.start_section import start_section
@@ -70,10 +70,10 @@ def render_page(
         GAMES_BYTES,
     )
     links = GameLinks(embedded=texts, episodes=tables.episodes)
-    environment = environment_of("reports")
     arms, pairs = failures_by_cause(tables.of_own_traits(tables.causes), texts)
     steps = next_steps(tables)
-    page = environment.get_template("report.html.jinja").render(
+    return page_of(
+        "report",
         **header(tables),
         **troubles(tables),
         acceptance=_acceptance(tables),
@@ -109,10 +109,9 @@ def render_page(
         human_plots=human_ranges.plots(tables.realism),
         content_policy=CONTENT_POLICY,
         elsewhere=ELSEWHERE.format("[]"),
-        libraries=sources(environment, LIBRARIES),
-        script=sources(environment, SCRIPTS),
+        libraries=sources(LIBRARIES),
+        script=sources(SCRIPTS),
     )
-    return page.strip() + "\n"
 
 
 def _acceptance(tables: RunTables) -> tuple[bool, str, list[Any]] | None:

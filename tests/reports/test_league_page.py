@@ -41,7 +41,9 @@ def test_page__a_cell_is_green_only_where_the_ego_copes(changed: dict[str, Any],
 
 def test_page__of_an_arm_of_which_no_game_was_played() -> None:
     table = table_of("league", [ROW | UNPLAYED])
-    assert "– (0 of 0)" in render_league("mine", table, ["merge/report.html"], [])
+    page = render_league("mine", table, ["merge/report.html"], [])
+    assert "– (0 of 0)" in page
+    assert "default-src 'none'" in page  # it loads nothing
     assert league_terminal(table).row_count == 1
     (row,) = table.to_dict("records")
     assert sentence_of(row) == "mine fails in 0 of 0 games against speedy in merge: – (95 %: –)."
