@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from harness.evaluation.competence import DID_NOT_LEARN
-from harness.evaluation.unplayed_games import reasons_of
+from harness.evaluation.unplayed_games import reasons_of, were_played
 from harness.reports.learning import stopped
 from harness.reports.provenance import QUICK, command_of, facts, made_by, mixed_versions
-from harness.reports.run_tables import RunTables, unplayed
+from harness.reports.run_tables import RunTables
 
 
 def header(tables: RunTables) -> dict[str, Any]:
@@ -28,7 +28,7 @@ def header(tables: RunTables) -> dict[str, Any]:
 
 def troubles(tables: RunTables) -> dict[str, Any]:
     """The banners: what is unfinished, what could not be played, and what makes the numbers mean less."""
-    errored = tables.episodes[unplayed(tables.episodes)]
+    errored = tables.episodes[~were_played(tables.episodes)]
     return {
         "from_tables": tables.is_from_tables,
         "unfinished": tables.unfinished,

@@ -29,6 +29,7 @@ from harness.evaluation.strategies import (
     round_of,
 )
 from harness.evaluation.tables import table_of
+from harness.evaluation.unplayed_games import were_played
 
 Row = Mapping[Any, Any]
 """A row of a table, by column."""
@@ -182,7 +183,7 @@ class RunTables:
     @cached_property
     def played(self) -> pd.DataFrame:
         """The rows of `episodes` that could be played."""
-        return self.episodes[~unplayed(self.episodes)]
+        return self.episodes[were_played(self.episodes)]
 
     @cached_property
     def rates(self) -> Mapping[tuple[str, int], Row]:
@@ -264,11 +265,6 @@ class RunTables:
 def crowds_of(manifest: Mapping[str, Any]) -> Mapping[str, Sequence[str]]:
     """The personas of each crowd of a manifest, in the order of the scene's people."""
     return {each["name"]: each["personas"] for each in manifest.get("campaign", {}).get("crowd", ())}
-
-
-def unplayed(episodes: pd.DataFrame) -> pd.Series:
-    """Which games could not be played."""
-    return (episodes["ego_outcome"] == "error") | (episodes["error"] != "")
 
 
 def played(row: Row | None) -> int:

@@ -16,6 +16,7 @@ from harness.evaluation.comparisons.preventability import TAKES_OVER
 from harness.evaluation.people import judged, judged_outcomes
 from harness.evaluation.strategies import Arm, counterparts
 from harness.evaluation.trace_file import TraceReader
+from harness.evaluation.unplayed_games import were_played
 from harness.evaluation.worst_first import choose_games, worst_first
 from harness.game.arrays import FloatArray
 from harness.game.roles import EGO
@@ -60,7 +61,7 @@ def failing_paths(
 ) -> Iterator[FailingPath]:
     """The last seconds of the games that an ego fails against a person, at most `MOST_PATHS` of an arm, worst first."""
     against = [name for name, arm in arms.items() if arm.ego and arm.non_ego and not arm.is_of_a_trait]
-    failed = episodes[episodes["arm"].isin(against) & (episodes["ego_failed"] == 1) & (episodes["error"] == "")]
+    failed = episodes[episodes["arm"].isin(against) & (episodes["ego_failed"] == 1) & were_played(episodes)]
     reader = TraceReader()
     for game in worst_first(failed).groupby("arm", sort=False).head(MOST_PATHS).itertuples():
         trace = reader.read(traces(game.arm, game.seed), game.episode)
@@ -88,7 +89,7 @@ def watching_order(
 ) -> pd.DataFrame:
     """The rows of `episodes` that were played, in the order of `recorded_games`. Games against a person with another
     person's trait are the last, but for examples."""
-    played = episodes[(episodes["error"] == "") & (episodes["ego_outcome"] != "error")]
+    played = episodes[were_played(episodes)]
     rows = {(game.arm, game.seed, game.episode): game.Index for game in played.itertuples()}
     order: dict[Any, None] = dict.fromkeys(rows[game] for game in examples if game in rows)
     own = played[~played["arm"].isin([name for name, arm in arms.items() if arm.is_of_a_trait])]

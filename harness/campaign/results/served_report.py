@@ -21,6 +21,7 @@ from harness.errors import UsageError
 from harness.evaluation.people import judged
 from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import TraceReader
+from harness.evaluation.unplayed_games import were_played
 from harness.evaluation.worst_first import worst_first
 from harness.reports.embedding import Causes, game_text, key
 from harness.reports.manoeuvres import causes_by_game, marks_of
@@ -52,7 +53,7 @@ class ServedReport:
         judged = (folder.path / TAKEN_OVER).is_file()
         self._takeovers = takeovers_of(read_csv(folder.result(TAKEN_OVER))) if judged else {}
         self._scene = open_scene(folder.scene)
-        played = worst_first(episodes[(episodes["error"] == "") & (episodes["ego_outcome"] != "error")])
+        played = worst_first(episodes[were_played(episodes)])
         rows: list[Any] = list(played.itertuples())
         self._games = {(game.arm, game.seed, game.episode): game for game in rows}
         self._page = served_page(page, [entry_of(game, self._causes) for game in rows], str(folder.path))

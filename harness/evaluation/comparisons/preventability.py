@@ -19,6 +19,7 @@ import pandas as pd
 
 from harness.evaluation.comparisons.comparison import rate_cells
 from harness.evaluation.tables import table_of
+from harness.evaluation.unplayed_games import were_played
 
 REGULATION = "careful_and_competent"
 """The reference driver of UN R157, by which failures are called preventable."""
@@ -46,7 +47,7 @@ def count_prevented(games: pd.DataFrame, episodes: pd.DataFrame) -> pd.DataFrame
     """
     rows: list[dict[str, object]] = []
     for (arm, persona, seed), judged in games.groupby(["arm", "persona", "seed"], sort=False):
-        played = episodes[(episodes["arm"] == arm) & (episodes["seed"] == seed) & (episodes["error"] == "")]
+        played = episodes[(episodes["arm"] == arm) & (episodes["seed"] == seed) & were_played(episodes)]
         played = played[played["ego_failed"].notna()]
         counted = {"arm": arm, "persona": persona, "seed": seed, "episodes": len(played)}
         counted["failures"] = int(played["ego_failed"].sum())
