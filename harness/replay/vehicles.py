@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles, PlacedObstacle
+from harness.game.roles import role_in_words
 from harness.road.demand.route_file import CAR_SIZE_M, SIZES_M
 from harness.road.demand.walks import WALKER_ATTRIBUTES, WALKER_TYPE
 from harness.road.xml.xml_file import parse_xml
@@ -80,7 +81,7 @@ def names_in_pictures(persona: object) -> dict[str, str]:
 
 def shown_name(player: str, names: Mapping[str, str]) -> str:
     """What a player is called in pictures: its entry in `names`, else its name in the trace."""
-    return names.get(player, player.replace("non_ego", "non-ego")).replace("_", " ")
+    return names[player].replace("_", " ") if player in names else role_in_words(player)
 
 
 def legend(trace: pd.DataFrame, names: Mapping[str, str]) -> str:

@@ -26,6 +26,7 @@ from harness.evaluation.rule_book.causes import causes_in_words
 from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import TraceReader
 from harness.evaluation.worst_first import FAILURES, replay_name, worst_first
+from harness.game.roles import role_in_words
 from harness.replay import follow_in_sumo_gui, names_in_pictures, write_film, write_replay
 from harness.replay.vehicles import legend
 from harness.road.scene.open_scene import OpenScene, open_scene
@@ -77,7 +78,7 @@ def game_table(run: Path, chosen: GameList) -> Table:
         padding=0,
     )
     for name in ("arm", "seed", "episode", *players, "cause", "TTC (s)", "severity"):
-        heading = name.replace("non_ego", "non-ego").replace("_", " ")
+        heading = role_in_words(name)
         table.add_column(heading, overflow="fold", no_wrap=name not in ("arm", "cause"))
     for game in games.itertuples():
         ttc = "" if pd.isna(game.ego_min_ttc_s) else f"{game.ego_min_ttc_s:.1f}"
