@@ -93,7 +93,6 @@ class Body:
     heading_rad: FloatArray
     """Without jumps of a whole turn."""
     speed_mps: FloatArray
-    acceleration_mps2: FloatArray
     leaves: bool
     """Whether it is gone before the game ends."""
 
@@ -171,10 +170,7 @@ def _bodies(
                 first_step=int(piece["step"].iloc[0]),
                 heading_rad=np.unwrap(piece["heading_rad"].to_numpy(float)),
                 leaves=int(piece["step"].iloc[-1]) < last_step,
-                **{
-                    column: piece[column].to_numpy(float)
-                    for column in ("time_s", "x_m", "y_m", "speed_mps", "acceleration_mps2")
-                },
+                **{column: piece[column].to_numpy(float) for column in ("time_s", "x_m", "y_m", "speed_mps")},
             )
 
 
@@ -197,7 +193,6 @@ def _buildings(outlines: Sequence[FloatArray], end_s: float) -> Iterator[Body]:
             y_m=np.full(2, rectangle.centroid.y),
             heading_rad=np.full(2, np.arctan2(along[1], along[0])),
             speed_mps=np.zeros(2),
-            acceleration_mps2=np.zeros(2),
             leaves=False,
         )
 

@@ -159,11 +159,6 @@ function outcomeOf(game) {
   return (OUTCOMES[game.outcome] ?? game.outcome) + (game.deltaV === null ? "" : `, delta-v ${game.deltaV.toFixed(1)} m/s`);
 }
 
-function describe(game) {
-  const nearest = game.leastTime === null || game.leastTime === 0 ? "" : `, least TTC ${game.leastTime.toFixed(1)} s`;
-  return `game ${game.episode}${severalSeeds ? `, seed ${game.seed}` : ""}: ${OUTCOMES[game.outcome] ?? game.outcome}${nearest}`;
-}
-
 /** The same episode with the other ego; undefined when the page does not contain it. */
 function counterpartOf(game) {
   const others = { naive: ["retrained", "reconfigured"], retrained: ["naive"], reconfigured: ["naive"] };

@@ -120,8 +120,10 @@ def test_lapses__shares_and_rates_are_those_of_drawn_lapses() -> None:
     lapses = [draw_lapses(TEXTING, 100, 0.1, np.random.default_rng(seed)).lapsed for seed in range(2000)]
     # a step of attention separates consecutive lapses, so the drawn share is slightly smaller
     assert np.mean(lapses) == pytest.approx(lapsed_share(TEXTING), abs=0.03)
-    free = np.mean([not each.any() for each in lapses])  # standard error sqrt(0.036 * 0.964 / 2000) = 0.0042
-    assert free == pytest.approx(free_share(TEXTING, 10.0), abs=4 * 0.0042)
+    rare = Attention(mean_attentive_s=55.0, lapse_s=(5.0, 5.0))
+    drives = [draw_lapses(rare, 600, 0.1, np.random.default_rng(seed)).lapsed for seed in range(2000)]
+    free = np.mean([not each.any() for each in drives])  # standard error sqrt(0.31 * 0.69 / 2000) = 0.0103
+    assert free == pytest.approx(free_share(rare), abs=4 * 0.0103)
 
 
 def test_drift__is_that_of_the_games_car() -> None:
