@@ -19,9 +19,10 @@ from PIL import Image, ImageGrab
 from harness.replay import follow_in_sumo_gui, sumo_gui
 from harness.replay.contacts import contacts
 from harness.replay.gui_settings import choose_view
-from harness.replay.sumo_gui import find_sumo_gui, find_xvfb, virtual_screen
+from harness.replay.sumo_gui import find_xvfb, virtual_screen
 from harness.replay.vehicles import types_of_vehicles
 from harness.sumo import gui
+from harness.sumo.gui import SUMO_GUI
 from tests.support.pictures import blue, orange, require_gui
 from tests.support.replays import GAMES, RAILS, STEP_S, collision_game, write
 
@@ -49,7 +50,7 @@ def photograph(folder: Path, screen: str, steps: list[int]) -> list[np.ndarray]:
         for file, step in zip(files, steps, strict=True)
     )
     (folder / "view.xml").write_text(settings.replace("</viewsettings>", taken + "</viewsettings>"))
-    command = [str(find_sumo_gui()), "-c", str(folder / "scene.sumocfg"), "--quit-on-end"]
+    command = [str(SUMO_GUI), "-c", str(folder / "scene.sumocfg"), "--quit-on-end"]
     environment = os.environ | {"DISPLAY": screen}
     for _ in range(5):  # SUMO-GUI dies of SIGSEGV, does not end, or takes pictures of one pixel now and then
         with contextlib.suppress(subprocess.TimeoutExpired):
@@ -149,9 +150,7 @@ def test_gui__asks_no_question_in_front_of_the_last_picture(screen: str, merge_n
     settings = re.sub(r"<delay [^>]*>", '<delay value="20"/>', settings)
     settings = settings.replace('<breakpoint time="3.300" />', "")  # of the contact: the halt at the end is left
     (folder / "view.xml").write_text(settings)
-    gui = subprocess.Popen(
-        [str(find_sumo_gui()), "-c", "scene.sumocfg"], cwd=folder, env=os.environ | {"DISPLAY": screen}
-    )
+    gui = subprocess.Popen([str(SUMO_GUI), "-c", "scene.sumocfg"], cwd=folder, env=os.environ | {"DISPLAY": screen})
     try:
         picture = settled(screen)
     finally:

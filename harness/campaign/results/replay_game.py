@@ -206,7 +206,7 @@ def replay_of(game: PlayedGame) -> Iterator[Path]:
 
 
 def watch(game: PlayedGame, console: Console) -> None:
-    """Show a game in SUMO-GUI until its user closes it. Raises UsageError if there is no screen or no SUMO-GUI."""
+    """Show a game in SUMO-GUI until its user closes it. Raises UsageError if there is no screen."""
     with replay_of(game) as replay:
         message = (
             f"SUMO-GUI plays {replay} at half of real time and follows the ego ({legend(game.trace, game.names)}). It "
