@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from harness.evaluation.competence import DID_NOT_LEARN
+from harness.evaluation.unplayed_games import reasons_of, were_played
 from harness.reports import human_ranges
 from harness.reports.acceptance_wording import acceptance_lines, by_sentence, headline
 from harness.reports.arm_figures import MOST_DOTS
@@ -21,9 +23,8 @@ from harness.reports.game_links import GameLinks
 from harness.reports.learning import learning, searches, stopped
 from harness.reports.manoeuvres import causes_by_game, failures_by_cause, marks_of
 from harness.reports.next_steps import next_steps
-from harness.reports.page_header import header, troubles
 from harness.reports.page_template import CONTENT_POLICY, ELSEWHERE, LIBRARIES, SCRIPTS, page_of, sources
-from harness.reports.provenance import asked_alone
+from harness.reports.provenance import QUICK, asked_alone, command_of, facts, made_by, mixed_versions
 from harness.reports.run_tables import RunTables
 from harness.reports.start_section import start_section
 from harness.reports.verdict_wording import as_sentence, planned_in_words
@@ -74,8 +75,8 @@ def render_page(
     steps = next_steps(tables)
     return page_of(
         "report",
-        **header(tables),
-        **troubles(tables),
+        **_header(tables),
+        **_troubles(tables),
         acceptance=_acceptance(tables),
         most_broken=MOST_BROKEN,
         failure_table=failure_table(tables, links),
@@ -112,6 +113,40 @@ def render_page(
         libraries=sources(LIBRARIES),
         script=sources(SCRIPTS),
     )
+
+
+def _header(tables: RunTables) -> dict[str, Any]:
+    """What the run is: its campaign, command and facts."""
+    manifest = tables.manifest
+    return {
+        "command": command_of(manifest),
+        "made_by": made_by(manifest),
+        "name": manifest.get("name", "campaign"),
+        "facts": facts(manifest, tables.seeds, len(tables.personas)),
+        "quick": QUICK if manifest.get("quick") else "",
+        "trained_before": tables.campaign.get("policies") or "",
+        "several_seeds": tables.several_seeds,
+        "change": tables.change,
+    }
+
+
+def _troubles(tables: RunTables) -> dict[str, Any]:
+    """The banners: what is unfinished, what could not be played, and what makes the numbers mean less."""
+    errored = tables.episodes[~were_played(tables.episodes)]
+    return {
+        "from_tables": tables.is_from_tables,
+        "unfinished": tables.unfinished,
+        "not_learned": [
+            (name, stopped(each)) for name, each in tables.stages.items() if each.get("stopped") == DID_NOT_LEARN
+        ],
+        "mixed": mixed_versions(tables.stages),
+        "errored": errored.groupby(["arm", "seed"], sort=False).size().items(),
+        "errors": len(errored),
+        "varying": list(tables.manifest.get("varying_drivers", {}).items()),
+        "learned_elsewhere": list(tables.manifest.get("learned_elsewhere", {}).items()),
+        "error_reasons": reasons_of(errored["error"]),
+        "ego_games": int(tables.episodes["ego_failed"].notna().sum()),
+    }
 
 
 def _acceptance(tables: RunTables) -> tuple[bool, str, list[Any]] | None:
