@@ -131,7 +131,7 @@ def exported_game(
     if trace.empty:
         raise ValueError(f"the trace of {name} has no rows")
     world = scene.world
-    types = types_of_vehicles(trace, scene.route_files, scene.obstacles)
+    types = types_of_vehicles(trace, scene.routes.types_xml, scene.obstacles)
     wheelbases_m = dict(zip(world.roles, world.actuators.wheelbase_m.tolist(), strict=True))
     end_s = float(trace["time_s"].max())
     bodies = [*_bodies(trace, types, wheelbases_m, world.roles), *_buildings(scene.obstacles.outlines, end_s)]

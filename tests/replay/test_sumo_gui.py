@@ -24,7 +24,7 @@ from harness.replay.vehicles import types_of_vehicles
 from harness.sumo import gui
 from harness.sumo.gui import SUMO_GUI
 from tests.support.pictures import blue, orange, require_gui
-from tests.support.replays import GAMES, RAILS, STEP_S, collision_game, write
+from tests.support.replays import GAMES, RAILS, ROUTES, STEP_S, collision_game, write
 
 DIALOGUE_RGB = (212, 208, 200)
 """The colour of SUMO-GUI's dialogues and tool bars."""
@@ -65,7 +65,7 @@ def photograph(folder: Path, screen: str, steps: list[int]) -> list[np.ndarray]:
 
 def place(mask: np.ndarray, trace: pd.DataFrame, net: Path) -> tuple[float, float]:
     """The centre of the marked pixels in net coordinates."""
-    found = contacts(trace, types_of_vehicles(trace, [net.with_name("merge.rou.xml")]), RAILS)
+    found = contacts(trace, types_of_vehicles(trace, ROUTES), RAILS)
     view = choose_view(trace, found)
     height, width = mask.shape
     metres = max(view.width_m / width, view.height_m / height)  # per pixel
@@ -94,7 +94,7 @@ def test_gui__prints_the_label_of_a_contact_on_white_above_the_road(
 ) -> None:
     trace = collision_game()
     (picture,) = photograph(write(trace, merge_net, tmp_path / "replay"), screen, [15])
-    found = contacts(trace, types_of_vehicles(trace, [merge_net.with_name("merge.rou.xml")]), RAILS)
+    found = contacts(trace, types_of_vehicles(trace, ROUTES), RAILS)
     view = choose_view(trace, found)
     height, width = picture.shape[:2]
     per_px = max(view.width_m / width, view.height_m / height)

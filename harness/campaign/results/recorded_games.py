@@ -73,7 +73,7 @@ def path_of(trace: pd.DataFrame, scene: OpenScene, game: Any) -> FailingPath:
     last = int(trace.loc[trace["player"] == "ego", "step"].max())
     shown = trace[trace["step"].between(last - round(SPAN_S / scene.world.step_s), last)].sort_values("step")
     players = {str(role): rows for role, rows in shown.groupby("player") if role in scene.world.roles}
-    touches = contacts(trace, types_of_vehicles(trace, scene.route_files, scene.obstacles), scene.rail_lines)
+    touches = contacts(trace, types_of_vehicles(trace, scene.routes.types_xml, scene.obstacles), scene.rail_lines)
     return FailingPath(
         arm=game.arm,
         persona=game.persona,
@@ -114,7 +114,7 @@ def takeovers_of(table: pd.DataFrame) -> Takeovers:
 
 def tracks_of(trace: pd.DataFrame, scene: OpenScene, game: Any, takeover: pd.DataFrame | None = None) -> GameTracks:
     """One game's trace as tracks; `game` is its row of `episodes`, `takeover` the course of a reference driver."""
-    types = types_of_vehicles(trace, scene.route_files, scene.obstacles)
+    types = types_of_vehicles(trace, scene.routes.types_xml, scene.obstacles)
     recorded = game_of(trace, scene)
     measures = {name: getattr(recorded.quantities, name) for name in ("leader_gap_m", "time_to_collision_s")}
     by_name = {str(name): rows.sort_values("step") for name, rows in trace.groupby("player", sort=True)}

@@ -134,18 +134,7 @@ class PlayedGame:
 
     def write_replay(self, folder: Path) -> None:
         """Write a folder that SUMO-GUI plays."""
-        write_replay(
-            self.trace,
-            self.scene.net_file,
-            self.scene.route_files,
-            folder,
-            title=self.title,
-            step_length_s=self.scene.world.step_s,
-            names=self.names,
-            rails=self.scene.rail_lines,
-            obstacles=self.scene.obstacles,
-            stripes=self.scene.stripes,
-        )
+        write_replay(self.trace, self.scene, folder, title=self.title, names=self.names)
 
 
 def played_game(run: Path, arm: str, episode: int, seed: int | None) -> PlayedGame:
