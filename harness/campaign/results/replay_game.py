@@ -27,8 +27,7 @@ from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import TraceReader
 from harness.evaluation.worst_first import FAILURES, replay_name, worst_first
 from harness.game.roles import role_in_words
-from harness.replay import follow_in_sumo_gui, names_in_pictures, write_film, write_replay
-from harness.replay.vehicles import legend
+from harness.replay import follow_in_sumo_gui, legend, names_in_pictures, write_film, write_replay
 from harness.road.scene.open_scene import OpenScene, open_scene
 
 _OTHERS = "--page, --rows, --outcome and ARM choose others"
