@@ -12,7 +12,7 @@ from rich.markup import escape
 from harness.cli import messages
 from harness.cli.output import AllowCode, RunEgo, RunPath, RunSeed, console_of_any_encoding, print_plain
 from harness.errors import FAILED, NOT_ACCEPTED, UsageError, plain
-from harness.game.roles import roles_of
+from harness.game.roles import role_in_words, roles_of
 from harness.shipped_documents import document_at
 
 if TYPE_CHECKING:
@@ -154,7 +154,7 @@ def _changes(game: PinnedGame) -> Iterator[str]:
     """The change from the campaign's start to the one that does not fail, for each player that changes."""
     assert game.no_failure_from is not None
     for player, role in enumerate(roles_of(len(game.start.position_m))):
-        name = role.replace("non_ego", "non-ego").replace("_", " ")
+        name = role_in_words(role)
         moved_m = game.no_failure_from.position_m[player] - game.drawn_start.position_m[player]
         faster_mps = game.no_failure_from.speed_mps[player] - game.drawn_start.speed_mps[player]
         changes = ((moved_m, "m"), (faster_mps, "m/s"))

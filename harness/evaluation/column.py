@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass, replace
 
+from harness.game.roles import role_in_words
+
 TEXT, FLAG = "object", "bool"
 COUNT, NUMBER, MAYBE = "int64", "float64", "Int64"
 """The pandas dtypes of columns; `MAYBE`: whole numbers or empty."""
@@ -42,8 +44,8 @@ class Column:
         if self.label:
             return self.label
         ending = next((ending for ending in _UNITS if self.name.endswith(ending)), "")
-        words = self.name.removesuffix(ending).replace("_ttc", "_time_to_collision").replace("non_ego", "non-ego")
-        words = words.replace("_", " ")
+        words = self.name.removesuffix(ending).replace("_ttc", "_time_to_collision")
+        words = role_in_words(words)
         return words.replace(" low", ", 95 % low").replace(" high", ", 95 % high")
 
     def with_interval(self, interval: str) -> Iterator[Column]:

@@ -1,14 +1,23 @@
-"""Why games could not be played: their errors, those of one reason together."""
+"""Which games could be played; why others could not: their errors, those of one reason together."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SHOWN = 3
 """The most reasons that are told."""
 _LONGEST = 500
 _NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?")
+
+
+def were_played(episodes: pd.DataFrame) -> pd.Series:
+    """Which games could be played, for each row of `episodes`."""
+    return (episodes["ego_outcome"] != "error") & (episodes["error"].fillna("") == "")
 
 
 def reason_of(error: str) -> str:

@@ -93,7 +93,6 @@ class Body:
     heading_rad: FloatArray
     """Without jumps of a whole turn."""
     speed_mps: FloatArray
-    acceleration_mps2: FloatArray
     leaves: bool
     """Whether it is gone before the game ends."""
 
@@ -132,7 +131,7 @@ def exported_game(
     if trace.empty:
         raise ValueError(f"the trace of {name} has no rows")
     world = scene.world
-    types = types_of_vehicles(trace, scene.route_files, scene.obstacles)
+    types = types_of_vehicles(trace, scene.routes.types_xml, scene.obstacles)
     wheelbases_m = dict(zip(world.roles, world.actuators.wheelbase_m.tolist(), strict=True))
     end_s = float(trace["time_s"].max())
     bodies = [*_bodies(trace, types, wheelbases_m, world.roles), *_buildings(scene.obstacles.outlines, end_s)]
@@ -171,10 +170,7 @@ def _bodies(
                 first_step=int(piece["step"].iloc[0]),
                 heading_rad=np.unwrap(piece["heading_rad"].to_numpy(float)),
                 leaves=int(piece["step"].iloc[-1]) < last_step,
-                **{
-                    column: piece[column].to_numpy(float)
-                    for column in ("time_s", "x_m", "y_m", "speed_mps", "acceleration_mps2")
-                },
+                **{column: piece[column].to_numpy(float) for column in ("time_s", "x_m", "y_m", "speed_mps")},
             )
 
 
@@ -197,7 +193,6 @@ def _buildings(outlines: Sequence[FloatArray], end_s: float) -> Iterator[Body]:
             y_m=np.full(2, rectangle.centroid.y),
             heading_rad=np.full(2, np.arctan2(along[1], along[0])),
             speed_mps=np.zeros(2),
-            acceleration_mps2=np.zeros(2),
             leaves=False,
         )
 

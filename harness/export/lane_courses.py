@@ -12,6 +12,8 @@ import shapely
 
 from harness.game.arrays import FloatArray, IntArray
 from harness.replay.floating_car_data import Lanes
+from harness.road.net.lane_map import neighbours
+from harness.road.net.network import read_net
 from harness.road.xml.xml_file import parse_xml
 
 NONE = -1
@@ -42,7 +44,7 @@ class LaneCourses:
 
     @classmethod
     def read(cls, net_file: Path) -> LaneCourses:
-        """Raises UsageError for a net that can't be read."""
+        """Raises UsageError for a net that can't be read, or has no lane for cars."""
         root, lanes = parse_xml(net_file), Lanes.read(net_file)
         row = {name: number for number, name in enumerate(lanes.ids)}
         after = _continuations(root, lanes, row)
@@ -53,9 +55,10 @@ class LaneCourses:
         for number, chain in enumerate(chains):
             course[chain] = number
         course = course[lanes.onward]
+        net = read_net(net_file)
         left, right = (
-            np.array([course[row[beside]] if (beside := _beside(name, step)) in row else NONE for name in lanes.ids])
-            for step in (1, -1)
+            np.array([NONE if name is None else course[row[name]] for name in names])
+            for names in zip(*(neighbours(net.getLane(name)) for name in lanes.ids), strict=True)
         )
         return cls(
             lanes=lanes,
@@ -87,11 +90,6 @@ def _bounds(root: ElementTree.Element, lanes: Lanes) -> tuple[float, float, floa
     left, bottom, right, top = lanes.bounds()
     half_m = 0.5 * max(float(lane.get("width", _WIDTH_M)) for lane in root.iter("lane"))
     return left - half_m, bottom - half_m, right + half_m, top + half_m
-
-
-def _beside(lane: str, step: int) -> str:
-    edge, _, index = lane.rpartition("_")
-    return f"{edge}_{int(index) + step}"
 
 
 def _continuations(root: ElementTree.Element, lanes: Lanes, row: dict[str, int]) -> dict[int, int]:

@@ -16,3 +16,12 @@ def roles_of(players: int) -> tuple[str, ...]:
     """The names of the players [P] of a game in every file: `ego`, `non_ego`, and with more people `non_ego_2`,
     `non_ego_3` and so on."""
     return (*ROLES, *(f"{ROLES[NON_EGO]}_{place}" for place in range(2, players)))
+
+
+def role_in_words(role: str) -> str:
+    """A name of `roles_of`, or one that begins with such a name, in prose.
+
+    >>> role_in_words("non_ego_2")
+    'non-ego 2'
+    """
+    return role.replace("non_ego", "non-ego").replace("_", " ")

@@ -232,7 +232,7 @@ def _zebra(net: Net, crossing: Edge) -> Iterator[Candidate]:
         return
     for edge in node.getIncoming():
         link = max(onward(edge), key=lambda link: float(_out(link) @ _into(link)), default=None)
-        if link is not None and shapely.intersects(shapely.LineString(line), _over(net, link)):
+        if link is not None and shapely.intersects(shapely.LineString(line), way_over(net, link)):
             yield Candidate(
                 kind=CandidateKind.ZEBRA,
                 junction=node.getID(),
@@ -243,8 +243,10 @@ def _zebra(net: Net, crossing: Edge) -> Iterator[Candidate]:
             )
 
 
-def _over(net: Net, link: Connection) -> shapely.LineString:
-    before = substring(shapely.LineString(lane_line(link.getFromLane())), -_BESIDE_M, 0.0)
+def way_over(net: Net, link: Connection) -> shapely.LineString:
+    """The way of a connection over its junction, with the ends of its lanes in which a crossing may be."""
+    incoming = shapely.LineString(lane_line(link.getFromLane()))
+    before = substring(incoming, max(incoming.length - _BESIDE_M, 0.0), incoming.length)
     behind = substring(shapely.LineString(lane_line(link.getToLane())), 0.0, _BESIDE_M)
     ends = [shapely.get_coordinates(each) for each in (before, behind)]
     return shapely.LineString(np.concatenate((ends[0], line_over_junction(net, link), ends[1])))

@@ -28,7 +28,7 @@ _LAYER_M = 6.0  # of height between a road and the one that it passes over
 _RING_M = 6.0  # of a roundabout of one lane. Our own: from 6 to 7 m most entries can be driven, at 5.5 m fewer
 _WAY = re.compile(rb"""<way\b(?:[^>"']|"[^"]*"|'[^']*')*?\sid=["']([^"']*)["'](?:[^>"']|"[^"]*"|'[^']*')*>""")
 _NO_ROAD = ("has no road that cars may use and that meets another", "export an area with junctions of roads for cars")
-_CUT = "cut out a part: netconvert -s FILE --keep-edges.in-boundary XMIN,YMIN,XMAX,YMAX -o part.net.xml"
+_CUT_NET = "cut out a part: netconvert -s FILE --keep-edges.in-boundary XMIN,YMIN,XMAX,YMAX -o part.net.xml"
 _OSM_TYPES = ("osmNetconvert", "osmNetconvertUrbanDe")
 _LIGHTS = ("--tls.cycle.time", "40")  # maps do not time their lights: red is short, so that games are
 _OSM_OPTIONS = (
@@ -89,7 +89,7 @@ def _copied(path: Path, folder: Path, left_hand: bool) -> ImportedMap:
         check_file(path, MOST_BYTES)
     except OSError as error:
         if error.errno == errno.EFBIG:
-            raise UsageError.of(path, "", str(error.strerror), _CUT) from None
+            raise UsageError.of(path, "", str(error.strerror), _CUT_NET) from None
     warnings = _check_own_net(path, left_hand)
     file = folder / "converted.net.xml"
     file.write_bytes(xml_bytes(path))

@@ -21,7 +21,7 @@ from harness.road.xml.xml_file import number_of, xml_bytes
 
 MOST_BYTES = 100_000_000
 """Of a map to convert, unpacked."""
-_CUT = "cut out the part around the junction, for instance with: osmium extract --bbox WEST,SOUTH,EAST,NORTH"
+_CUT_MAP = "cut out the part around the junction, for instance with: osmium extract --bbox WEST,SOUTH,EAST,NORTH"
 _FOR_CARS = {
     *("motorway", "trunk", "primary", "secondary", "tertiary", "unclassified", "residential", "living_street"),
     *("motorway_link", "trunk_link", "primary_link", "secondary_link", "tertiary_link", "service", "road"),
@@ -73,6 +73,8 @@ class MapFacts:
         if self.says_left:
             return "has the tag driving_side=left"
         (south, west), (north, east) = self.lowest_deg, self.highest_deg
+        if south > north:  # a file without nodes lies nowhere
+            return ""
         ends = zip(_ISLES_DEG, (0.0, 1.0, 1.78), strict=True)
         inside = any(low <= south and north <= 61.0 and west >= -10.8 and east <= end for low, end in ends)
         return "lies in Great Britain or Ireland" if inside else ""
@@ -109,7 +111,7 @@ def facts_of(path: Path, kind: MapKind) -> MapFacts:
     except FileNotFoundError:
         raise UsageError.of(path, "", "there is no such file", "name another file") from None
     except OSError as error:
-        raise UsageError.of(path, "", str(error.strerror), _CUT) from None
+        raise UsageError.of(path, "", str(error.strerror), _CUT_MAP) from None
     except DefusedXmlException:
         raise UsageError.of(path, "", "carries XML entities or a document type", "remove them") from None
     except (ParseError, ValueError, LookupError, RecursionError) as error:

@@ -14,14 +14,13 @@ import numpy as np
 from sumolib.net import Net
 
 from harness.errors import UsageError
-from harness.game.arrays import FloatArray
 from harness.game.junctions import SIGNALS, Signal
 from harness.maps.game_plans import GamePlan, Plans
 from harness.maps.import_map import import_map
 from harness.maps.map_traffic import read_traffic
 from harness.road.demand.route_file import RouteFile
 from harness.road.net.net_listing import ListedJunction, ListedLane, edges_near, listed
-from harness.road.net.network import car_lanes, junctions_near, lane_line, nodes_of
+from harness.road.net.network import junctions_near, nodes_of
 from harness.road.net.tiles import Tile, write_tiles
 from harness.road.xml.xml_file import number_of, parse_xml
 
@@ -64,9 +63,6 @@ class OpenMap:
         names = [unescape(self.net.getEdge(name).getName() or "") for way in ways for name in way.edges]
         streets = " / ".join(dict.fromkeys(name for name in names if name)) or f"junction {candidate.junction}"
         return f"{streets} ({candidate.place[0]:.0f}, {candidate.place[1]:.0f})"
-
-    def roads(self) -> list[FloatArray]:
-        return [lane_line(lane) for edge in self.net.getEdges(withInternal=False) for lane in car_lanes(edge)]
 
     def listed(self) -> tuple[list[ListedLane], list[ListedJunction]]:
         return listed(self.net.getEdges(withInternal=False))

@@ -9,7 +9,7 @@ view.xml           zoom, speed, and the halts at contacts and at the end
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 from xml.etree import ElementTree
@@ -17,66 +17,59 @@ from xml.etree import ElementTree
 import pandas as pd
 
 from harness.files import complete_folder
-from harness.game.arrays import FloatArray
-from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles
 from harness.replay.contacts import contacts
 from harness.replay.floating_car_data import Lanes, shown_at, write_recording, write_xml
 from harness.replay.gui_settings import WINDOW_PX, choose_view, view_settings
 from harness.replay.scenery import painted, programmes, scenery, shapes_of
 from harness.replay.vehicles import legend, types_of_vehicles
+from harness.road.scene.open_scene import OpenScene
 from harness.road.xml.xml_file import xml_bytes
 
 
 def write_replay(
     trace: pd.DataFrame,
-    net_file: Path,
-    route_files: Sequence[Path],
+    scene: OpenScene,
     folder: Path,
     *,
     title: str,
-    step_length_s: float,
     names: Mapping[str, str] = MappingProxyType({}),
-    rails: Sequence[FloatArray] = (),
-    obstacles: Obstacles = NO_OBSTACLES,
-    stripes: Sequence[FloatArray] = (),
 ) -> None:
-    """Write one game's replay to `folder`, which is replaced. The folder appears only when it is complete.
+    """Write the replay of one game on a scene to `folder`, which is replaced. The folder appears only when it is
+    complete.
 
-    `trace` is the game's rows (columns as in `traces/`), `route_files` define its vehicle types, `names` are what
-    players are called in the title, by their names in the trace, `rails` are polylines [n, 2] in net coordinates,
-    `obstacles` are those of the scene, `stripes` are the corners [n, 2] of each stripe of its marked crossings. The
-    same arguments give the same bytes.
+    `trace` is the game's rows (columns as in `traces/`), `names` are what players are called in the title, by their
+    names in the trace. The same arguments give the same bytes.
     Raises ValueError for a trace with no row or with more than one game.
     """
     if trace["episode"].nunique() != 1:
         raise ValueError(f"a replay is of one game; the trace has {trace['episode'].nunique()}")
     trace = trace.astype({"player": str, "vehicle_type": str, "outcome": str})
-    types = types_of_vehicles(trace, route_files, obstacles)
-    lanes = Lanes.read(net_file)
-    touches = contacts(trace, types, rails)
+    types = types_of_vehicles(trace, scene.routes.types_xml, scene.obstacles)
+    lanes, step_s = Lanes.read(scene.net_file), scene.world.step_s
+    touches = contacts(trace, types, scene.rail_lines)
     view = choose_view(trace, touches)
 
     folder.parent.mkdir(parents=True, exist_ok=True)
     with complete_folder(folder, replaces=True) as partial:
-        (partial / "scene.net.xml").write_bytes(xml_bytes(net_file))
+        (partial / "scene.net.xml").write_bytes(xml_bytes(scene.net_file))
         shown_title = f"{title}   {legend(trace, names)}"
-        added = scenery(types=types, rails=rails, touches=touches, view=view, title=shown_title)
-        added.extend((*painted(stripes), *shapes_of(trace, types, obstacles), *programmes(trace, step_length_s)))
+        added = scenery(types=types, rails=scene.rail_lines, touches=touches, view=view, title=shown_title)
+        added.extend((*painted(scene.stripes), *shapes_of(trace, types, scene.obstacles), *programmes(trace, step_s)))
         write_xml(added, partial / "scene.add.xml")
         write_recording(
             trace=trace[[bool(types[name].shape) for name in trace["player"]]],
             types=types,
             lanes=lanes,
-            step_length_s=step_length_s,
+            step_length_s=step_s,
             file=partial / "episode.fcd.xml",
         )
         moments = [*(contact.time_s for contact in touches), float(trace["time_s"].max())]
-        halts_s = sorted({shown_at(moment, step_length_s) for moment in moments})
+        halts_s = sorted({shown_at(moment, step_s) for moment in moments})
         signals = "signals" in trace and bool((trace["signals"] != "").any())
         write_xml(view_settings(view, halts_s, lanes, signals=signals), partial / "view.xml")
         # Without an end SUMO would never stop. At the end SUMO-GUI asks a question in front of the picture; the end is
         # a step beyond the last halt, so that the picture stays free until the user presses the play button.
-        write_xml(_configuration(title, halts_s[-1] + 2 * step_length_s, step_length_s), partial / "scene.sumocfg")
+        write_xml(_configuration(title, halts_s[-1] + 2 * step_s, step_s), partial / "scene.sumocfg")
 
 
 def _configuration(title: str, end_s: float, step_length_s: float) -> ElementTree.Element:

@@ -24,7 +24,7 @@ from harness.errors import HarnessError, Problem, UsageError
 from harness.game.arrays import FloatArray
 from harness.replay.pictures import FORMATS, Label, captioned, encode, find_ffmpeg, kept_apart, labels_at
 from harness.replay.scenery import labels_of_contacts
-from harness.replay.sumo_gui import NO_SUMO_GUI, find_sumo_gui, find_xvfb, screen_problem, virtual_screen
+from harness.replay.sumo_gui import find_xvfb, screen_problem, virtual_screen
 from harness.replay.vehicles import PLAYER_COLOURS, legend
 from harness.road.xml.xml_file import parse_xml
 from harness.sumo.gui import WindowClosed, steered_gui
@@ -48,8 +48,6 @@ def film_problems(file: Path) -> list[Problem]:
         problems.append(Problem("ffmpeg", "", "is not installed, and an .mp4 needs it", remedy))
     if not file.parent.is_dir():
         problems.append(Problem(str(file.parent), "", "is not a folder", "create it first"))
-    if find_sumo_gui() is None:
-        problems.append(NO_SUMO_GUI)
     if find_xvfb() is None and screen_problem("") is not None:
         remedy = "apt-get install xvfb libgl1 libgl1-mesa-dri libglu1-mesa libegl1, or film on a computer with a screen"
         problems.append(Problem("Xvfb", "", "is not installed, and there is no other screen", remedy))
@@ -115,8 +113,6 @@ def _photographed(
     folder: Path, centres: FloatArray, width_m: float, shown: range, *, work: Path, display: str | None
 ) -> Iterator[Image.Image]:
     """SUMO-GUI's pictures of the shown steps, in order, each around its centre [T + 1, 2] (m)."""
-    program = find_sumo_gui()
-    assert program is not None, "film_problems has checked for it"
     options = ["-c", str(folder / "scene.sumocfg"), "--quit-on-end"]  # also after a failure
     for option, name, left_out in (
         ("--gui-settings-file", "view.xml", r"<(breakpoint|delay) [^>]*>"),  # a halt would wait for the play button
@@ -126,7 +122,7 @@ def _photographed(
         (work / name).write_text(re.sub(left_out, "", content), encoding="utf-8")
         options += [option, str(work / name)]
     picture, height_m = work / "picture.png", width_m * SIZE_PX[1] / SIZE_PX[0]
-    with steered_gui(program, options, display=display, patient=False) as window:
+    with steered_gui(options, display=display, patient=False) as window:
         try:
             # SUMO's first step only inserts the vehicles, and its first picture has another size
             for step in range(-1, shown[-1] + 1):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import importlib.util
 import os
 import re
 import select
@@ -19,7 +18,6 @@ from harness.sumo.gui import WindowClosed, end_process, steered_gui
 
 FOLLOWED_M = (80.0, 40.0)  # of road around the ego: a car of 4.6 m is then 73 pixels long
 _EGO = "ego"
-NO_SUMO_GUI = Problem("sumo-gui", "", "is not installed", "pip install eclipse-sumo, or put SUMO's bin folder on PATH")
 _END = re.compile(r'<(end|step-length) value="([0-9.]+)"')
 
 
@@ -27,23 +25,21 @@ def follow_in_sumo_gui(folder: Path, opened: Callable[[], None]) -> None:
     """Play a replay folder in SUMO-GUI with the view following the ego; return when the user closes SUMO-GUI.
 
     `opened` is called when the window is open. SUMO-GUI has no setting for the followed vehicle in a file, only a
-    command over TraCI. Raises UsageError, with the remedy, when the folder is not a replay, when there is no SUMO-GUI
-    or no screen; SimulationError if SUMO-GUI can't start.
+    command over TraCI. Raises UsageError, with the remedy, when the folder is not a replay, or when there is no
+    screen; SimulationError if SUMO-GUI can't start.
     """
-    configuration, program, problems = folder / "scene.sumocfg", find_sumo_gui(), list[Problem]()
+    configuration, problems = folder / "scene.sumocfg", list[Problem]()
     if not configuration.is_file():
         remedy = "`harness replay RUN --list` lists the games"
         problems.append(Problem(str(folder), "", "is not a replay: it has no scene.sumocfg", remedy))
-    if program is None:
-        problems.append(NO_SUMO_GUI)
     remedy = f"film it: --film game.gif; or on a computer with a desktop and SUMO: sumo-gui -c {configuration}"
     if no_screen := screen_problem(remedy):
         problems.append(no_screen)
-    if problems or program is None:
+    if problems:
         raise UsageError(problems)
     options = dict(_END.findall(configuration.read_text(encoding="utf-8")))
     steps = round(float(options["end"]) / float(options["step-length"]))
-    with steered_gui(program, ["-c", str(configuration)]) as window:
+    with steered_gui(["-c", str(configuration)]) as window:
         opened()
         try:
             following = False
@@ -64,17 +60,6 @@ def screen_problem(remedy: str) -> Problem | None:
     if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
         return Problem("sumo-gui", "DISPLAY", "there is no screen for it", remedy)
     return None
-
-
-def find_sumo_gui() -> Path | None:
-    """SUMO-GUI of the installed package `eclipse-sumo`, the version of the game; else the one on PATH."""
-    package = importlib.util.find_spec("sumo")  # an import would change the environment
-    for location in (package.submodule_search_locations or []) if package else []:
-        found = shutil.which("sumo-gui", path=str(Path(location) / "bin"))
-        if found:
-            return Path(found)
-    found = shutil.which("sumo-gui")
-    return Path(found) if found else None
 
 
 _STARTS_WITHIN_S = 30.0

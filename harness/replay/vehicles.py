@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
-from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pandas as pd
 
 from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles, PlacedObstacle
+from harness.game.roles import role_in_words
 from harness.road.demand.route_file import CAR_SIZE_M, SIZES_M
 from harness.road.demand.walks import WALKER_ATTRIBUTES, WALKER_TYPE
-from harness.road.xml.xml_file import parse_xml
 
 PLAYER_COLOURS = {
     "ego": "31,119,255",  # blue and orange, as in the paper's figure 2
@@ -80,7 +80,7 @@ def names_in_pictures(persona: object) -> dict[str, str]:
 
 def shown_name(player: str, names: Mapping[str, str]) -> str:
     """What a player is called in pictures: its entry in `names`, else its name in the trace."""
-    return names.get(player, player.replace("non_ego", "non-ego")).replace("_", " ")
+    return names[player].replace("_", " ") if player in names else role_in_words(player)
 
 
 def legend(trace: pd.DataFrame, names: Mapping[str, str]) -> str:
@@ -97,16 +97,14 @@ def presences(rows: pd.DataFrame) -> Iterator[pd.DataFrame]:
 
 
 def types_of_vehicles(
-    trace: pd.DataFrame, route_files: Sequence[Path], obstacles: Obstacles = NO_OBSTACLES
+    trace: pd.DataFrame, types_xml: str, obstacles: Obstacles = NO_OBSTACLES
 ) -> dict[str, DrawnVehicle]:
-    """The drawing of each vehicle and obstacle of one game, by its id.
+    """The drawing of each vehicle and obstacle of one game, by its id; `types_xml` is that of the scene's routes.
 
     The players get types of their own. Background vehicles keep their type, in grey where it has no colour. A type that
-    the route files do not define is SUMO's default.
+    the routes do not define is SUMO's default.
     """
-    defined: dict[str, dict[str, str]] = {WALKER_TYPE: WALKER_ATTRIBUTES}
-    for route_file in route_files:
-        defined |= _defined_types(route_file, route_file.stat().st_mtime_ns)
+    defined = {WALKER_TYPE: WALKER_ATTRIBUTES, **_defined_types(types_xml)}
     vehicles = trace.drop_duplicates("player")
     types = {}
     for vehicle, type_id in sorted(zip(vehicles["player"], vehicles["vehicle_type"], strict=True)):
@@ -119,9 +117,9 @@ def types_of_vehicles(
 
 
 @lru_cache(maxsize=8)
-def _defined_types(route_file: Path, modified_ns: int) -> dict[str, dict[str, str]]:
-    """The attributes of each type in a route file. It is read again when it has been modified."""
-    root = parse_xml(route_file)
+def _defined_types(types_xml: str) -> dict[str, dict[str, str]]:
+    """The attributes of each type."""
+    root = ElementTree.fromstring(types_xml)
     return {str(element.get("id")): dict(element.attrib) for element in root.iter("vType")}
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from harness.evaluation.strategies import NAIVE_ALONE, NAIVE_VS_SUMO, Arm, NaiveEgo, against_persona, persona_alone
+from harness.evaluation.strategies import NAIVE_ALONE, NAIVE_VS_SUMO, persona_alone
 from harness.reports.arm_figures import (
     MOST_LINES,
     NOT_PLAYED,
@@ -22,19 +22,13 @@ from harness.reports.differences import statistics
 from harness.reports.failing_paths import SPAN_S, FailingPath, paths_figures
 from harness.reports.game_links import GameLinks
 from harness.reports.human_ranges import crashes_alone
-from harness.reports.key_figures import card_verdict, egos_of, key_figures, portrait
+from harness.reports.key_figures import card_verdict, key_figures, portrait
 from harness.reports.numbers import number, percent, sure
-from harness.reports.run_tables import QUESTIONS, Row, RunTables, failures, failures_of, played
+from harness.reports.run_tables import QUESTIONS, Row, RunTables, played
 from harness.reports.verdict_wording import answer, over_trainings_statistics
 
 LONGEST_LABEL = 12
 """Letters of a persona's name that fit under a column of a figure."""
-CAUTION = "Caution"
-FAILS_ALONE = "The {naive} also fails alone: the persona does not cause all of its failures."
-AS_MANY_FAILURES = (
-    "This is not less often than against {persona}{seeds}: the ego also fails against an ordinary driver."
-)
-STILL_DRIVES = "The {made} ego alone: does it still drive without failures?"
 SPREADS = "Average speed, trailing distance, least time to collision and hardest braking of the ego in each game"
 
 
@@ -50,7 +44,6 @@ def card(
     that an ego fails, on the road `scene`."""
     is_changed, figures = bool(tables.asked("RQ2", persona)), key_figures(persona, tables)
     columns = _columns(persona, is_changed, tables, links)
-    tests = [row for row in tables.comparisons.to_dict("records") if row["persona"] == persona]
     labels = {columns[0].arm: f"{tables.naive}, alone", columns[2].arm: f"{tables.naive}, against {persona}"}
     labels |= {each.arm: f"{tables.change.made} ego, against {persona}" for each in columns[3:]}
     failed = {arm: tables.counts_of(arm)[0] for arm in labels}
@@ -72,8 +65,8 @@ def card(
         "key_figures": figures,
         "statistics": [
             f"{row['question']}{', seed ' + str(row['seed']) if tables.several_seeds else ''}. {statistics(row)}"
-            for row in tests
-            if row["p_value"] == row["p_value"]
+            for row in tables.comparisons.to_dict("records")
+            if row["persona"] == persona and row["p_value"] == row["p_value"]
         ]
         + [
             over_trainings_statistics(row)
@@ -97,8 +90,7 @@ def card(
             f"spread{place}",
             _alternative(SPREADS, columns, "min_ttc_s", lambda time: f"least time {number(time, 1)} s"),
         ),
-        "facts": _facts(persona, is_changed, tables),
-        "tests": tests,
+        "facts": _facts(persona, tables),
     }
 
 
@@ -139,45 +131,18 @@ def _paired(persona: str, place: int, before: ArmColumn, after: ArmColumn, table
     return paired_figure(pairs, f"paired{place}", alternative, change.made), note
 
 
-def _facts(persona: str, is_changed: bool, tables: RunTables) -> list[tuple[str, Sequence[str]]]:
-    arm = against_persona(NaiveEgo(), persona).name
-    facts: list[tuple[str, Sequence[str]]] = []
-    causes = {
-        seed: f"collision in {row['collisions']}, rail contact in {row['rails']}, timeout in {row['timeouts']} games."
-        for seed, row in tables.rates_of(arm).items()
-        if failures(row)
-    }
-    if causes:
-        facts.append((f"How the {tables.naive} fails against {persona}", _by_seed(causes)))
-    for _, made, judged in egos_of(persona, tables):
-        prevented = {seed: " ".join(sentences) for seed, sentences in tables.preventability_of(judged).items()}
-        if prevented:
-            facts.append((f"Could the failures of the {made} have been prevented?", _by_seed(prevented)))
-    facts.append(("An ordinary SUMO driver in the persona's place", _ordinary_driver(persona, tables)))
+def _facts(persona: str, tables: RunTables) -> tuple[str, list[str]]:
+    """What the first screen does not say: how often each persona of a population makes the ego fail, or else how the
+    persona drives alone."""
     by_driver = [row for row in tables.populations.to_dict("records") if row["population"] == persona]
     if by_driver:
-        lines = [_by_driver(row, several=tables.several_seeds) for row in by_driver]
-        facts.append(("Results by the persona that drove", lines))
-    else:
-        facts.append(("The persona alone on the road", _alone(persona, tables)))
-    if is_changed:
-        change = tables.change
-        alone = tables.rates_of(Arm(ego=change.ego(persona)).name)
-        facts.append((STILL_DRIVES.format(made=change.made), _counts(alone, f"the {change.made} ego")))
-    if any(failures(row) for row in tables.rates_of(NAIVE_ALONE.name).values()):
-        facts.append((CAUTION, [FAILS_ALONE.format(naive=tables.naive)]))
-    return [(title, lines or [NOT_PLAYED]) for title, lines in facts]
+        return "Results by the persona that drove", [_by_driver(row, several=tables.several_seeds) for row in by_driver]
+    return "The persona alone on the road", _alone(persona, tables) or [NOT_PLAYED]
 
 
 def _by_seed(lines: Mapping[int, str]) -> list[str]:
     """The lines, each with its seed before it when there are several."""
     return [f"Seed {seed}: {line}" if len(lines) > 1 else line[:1].upper() + line[1:] for seed, line in lines.items()]
-
-
-def _counts(rows: Mapping[int, Row], player: str = "") -> list[str]:
-    """A line per seed, e.g. "18 of 60 games (95 %: 18.8–43.2 %)"; with a player, "The ego fails in 18 of …"."""
-    counts = {seed: f"{failures_of(row)} games ({_sure(row, 'failure_rate')})" for seed, row in rows.items()}
-    return _by_seed({seed: f"{player} fails in {text}." if player else text for seed, text in counts.items()})
 
 
 def _sure(row: Row, rate: str) -> str:
@@ -207,18 +172,3 @@ def _alone(persona: str, tables: RunTables) -> list[str]:
 def _crashes(tables: RunTables, persona: str, seed: int) -> str:
     crashes = crashes_alone(tables.realism, persona, seed)
     return f", with {crashes}" if crashes else ""
-
-
-def _ordinary_driver(persona: str, tables: RunTables) -> list[str]:
-    ordinary = tables.rates_of(NAIVE_VS_SUMO.name)
-    against = tables.rates_of(against_persona(NaiveEgo(), persona).name)
-    seeds = [
-        seed
-        for seed, row in ordinary.items()
-        if seed in against and row["failure_rate"] >= against[seed]["failure_rate"] > 0
-    ]
-    lines = _counts(ordinary, f"the {tables.naive}")
-    if seeds:
-        named = f" (seed {', '.join(map(str, seeds))})" if len(ordinary) > 1 else ""
-        lines.append(AS_MANY_FAILURES.format(persona=persona, seeds=named))
-    return lines

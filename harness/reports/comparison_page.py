@@ -13,7 +13,7 @@ from harness.reports.embedding import key
 from harness.reports.figures import GAME
 from harness.reports.history_figures import PersonHistory, history_figures
 from harness.reports.numbers import MISSING, NO_SPACE, interval, number, percent, signed
-from harness.reports.page_template import environment_of
+from harness.reports.page_template import page_of
 from harness.reports.provenance import command_of, facts, made_by
 
 BETTER, WORSE, UNKNOWN = "better", "worse", "not the same games"
@@ -100,23 +100,19 @@ class Comparison:
     def page(self) -> str:
         """The page as HTML. Equal input gives equal text."""
         labels = [run.label for run in self.runs]
-        return (
-            environment_of("reports")
-            .get_template("compare.html.jinja")
-            .render(
-                runs=[
-                    (each.name, command_of(each.manifest), made_by(each.manifest), _facts(each)) for each in self.runs
-                ],
-                labels=labels,
-                figures=list(history_figures(self.histories, labels)),
-                histories=[
-                    (each.ego, each.person, [each.text(place) or MISSING for place in range(len(labels))])
-                    for each in self.histories
-                ],
-                transitions=[(each, list(_changed(each))) for each in self.transitions],
-                different_starts=DIFFERENT_STARTS,
-                several_seeds=len({row.found.seed for each in self.transitions for row in each.rows}) > 1,
-            )
+        return page_of(
+            "compare",
+            runs=[(each.name, command_of(each.manifest), made_by(each.manifest), _facts(each)) for each in self.runs],
+            labels=labels,
+            figures=list(history_figures(self.histories, labels)),
+            histories=[
+                (each.ego, each.person, [each.text(place) or MISSING for place in range(len(labels))])
+                for each in self.histories
+            ],
+            transitions=[(each, list(_changed(each))) for each in self.transitions],
+            different_starts=DIFFERENT_STARTS,
+            relevant_mps=RELEVANT_SPEED_MPS,
+            several_seeds=len({row.found.seed for each in self.transitions for row in each.rows}) > 1,
         )
 
 

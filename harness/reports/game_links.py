@@ -12,6 +12,7 @@ import pandas as pd
 
 from harness.evaluation.people import COLLIDED_WITH, judged
 from harness.evaluation.worst_first import replay_name, worst_first
+from harness.game.roles import role_in_words
 from harness.reports.embedding import key
 from harness.reports.figures import GAME
 from harness.reports.numbers import NO_SPACE, number
@@ -63,7 +64,7 @@ class GameLinks:
             found.append(
                 {
                     "game": f"{game['arm']}{seed}, game {game['episode']}",
-                    "outcome": f"{_in_words(who)}: {outcome}{_with(game)}{_impact(game)}",
+                    "outcome": f"{role_in_words(who)}: {outcome}{_with(game)}{_impact(game)}",
                     "min_ttc": number(game["ego_min_ttc_s"], 2),
                     "command": replay_command(game, several_seeds),
                     "scene": f"sumo-gui -c {shlex.quote(f'replays/{_name(game)}/scene.sumocfg')}",
@@ -87,14 +88,10 @@ def _key(game: Mapping[Any, Any]) -> str:
     return key(game["arm"], game["seed"], game["episode"])
 
 
-def _in_words(name: str) -> str:
-    return name.replace("non_ego", "non-ego").replace("_", " ")
-
-
 def _with(game: Mapping[Any, Any]) -> str:
     """What the ego collided with, where a table of several people has it."""
     other = game.get(COLLIDED_WITH, "")
-    return f" with {_in_words(other) if other != 'background' else 'background traffic'}" if other else ""
+    return f" with {role_in_words(other) if other != 'background' else 'background traffic'}" if other else ""
 
 
 def _impact(game: Mapping[Any, Any]) -> str:

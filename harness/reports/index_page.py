@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from urllib.parse import quote
 
 from harness.reports.numbers import MISSING, duration, percent
-from harness.reports.page_template import environment_of
+from harness.reports.page_template import page_of
 from harness.reports.text_table import add_text_row, text_table
 
 if TYPE_CHECKING:
@@ -92,8 +92,8 @@ def render_index(folder: str, runs: Sequence[IndexedRun], search: str = "") -> s
         }
         for run in shown
     ]
-    environment = environment_of("reports")
-    return environment.get_template("index.html.jinja").render(
+    return page_of(
+        "index",
         folder=folder,
         rows=rows,
         runs=len(runs),

@@ -17,6 +17,7 @@ from harness.game.lapses import Attention
 from harness.game.roles import NON_EGO
 from harness.reports.differences import NO_RELEVANT_DIFFERENCE, faster_by, is_equivalent
 from harness.reports.numbers import NO_SPACE, number, percent, sure
+from harness.reports.persona.profile import length_of_lapses
 from harness.reports.run_tables import RunTables, played
 from harness.reports.severity_wording import severity_clause
 from harness.reports.verdict_wording import Answer
@@ -160,8 +161,8 @@ def portrait(document: Mapping[str, Any]) -> str:
         sentences.append(f"It does not glance over the shoulder in {percent(share)} of drives.")
     if given := document.get("attention"):
         attention = Attention(**given)
-        (low, high), every = attention.lapse_s, attention.mean_attentive_s + attention.mean_lapse_s
-        sentences.append(f"Its eyes leave the road for {low:g} to {high:g} s at a time, about every {every:.2g} s.")
+        every = attention.mean_attentive_s + attention.mean_lapse_s
+        sentences.append(f"Its eyes leave the road about every {every:.2g} s: for {length_of_lapses(attention)}.")
     return " ".join(sentence for sentence in sentences if sentence)
 
 

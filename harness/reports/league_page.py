@@ -13,7 +13,8 @@ from harness.evaluation.comparisons.tied_ranks import with_shield
 from harness.evaluation.league_columns import SUMO_DRIVER, UNTRAINED
 from harness.reports.failure_table import ORDINARY, FailureCell
 from harness.reports.numbers import NO_SPACE, interval, number, percent
-from harness.reports.page_template import environment_of
+from harness.reports.page_template import page_of
+from harness.reports.run_tables import failures, failures_of, played
 from harness.reports.severity_wording import RISK_TONES, risk_tone
 from harness.reports.text_table import add_text_row, text_table
 
@@ -38,25 +39,22 @@ def render_league(ego: str, table: pd.DataFrame, addresses: Sequence[str], faile
     for row, address in zip(rows, addresses, strict=True):
         people = met.setdefault((row["scene"], row["shield"]), {})
         people.setdefault(row["person"], []).append(_cell(row, address))
-    return (
-        environment_of("reports")
-        .get_template("league.html.jinja")
-        .render(
-            ego=ego,
-            scenes=len(scenes),
-            games=int(table["episodes"].sum() - table["errors"].sum()),
-            columns=[person_in_words(each) for each in UNTRAINED],
-            lines=[
-                (with_shield(*line), [met[line].get(each, []) for each in UNTRAINED], _people(met[line]))
-                for line in product(scenes, shields)
-                if line in met
-            ],
-            headings=HEADINGS,
-            tones=RISK_TONES,
-            rows=[(address, list(_texts(row))) for row, address in zip(rows, addresses, strict=True)],
-            failed=failed,
-            not_answered=not_answered(table),
-        )
+    return page_of(
+        "league",
+        ego=ego,
+        scenes=len(scenes),
+        games=int(table["episodes"].sum() - table["errors"].sum()),
+        columns=[person_in_words(each) for each in UNTRAINED],
+        lines=[
+            (with_shield(*line), [met[line].get(each, []) for each in UNTRAINED], _people(met[line]))
+            for line in product(scenes, shields)
+            if line in met
+        ],
+        headings=HEADINGS,
+        tones=RISK_TONES,
+        rows=[(address, list(_texts(row))) for row, address in zip(rows, addresses, strict=True)],
+        failed=failed,
+        not_answered=not_answered(table),
     )
 
 
@@ -77,7 +75,7 @@ def league_terminal(table: pd.DataFrame) -> Table:
     for row in table.head(12).to_dict("records"):
         style = "dim" if row["reason"] else "red" if row["failure_rate"] > _MUCH else None
         scene, person, _, span, preventable, *_ = _texts(row)
-        add_text_row(shown, scene, person, _counts(row), span, preventable, style=style)
+        add_text_row(shown, scene, person, failures_of(row), span, preventable, style=style)
     return shown
 
 
@@ -96,7 +94,7 @@ def sentence_of(row: Mapping[Any, Any]) -> str:
     low, high = row["failure_rate_low"], row["failure_rate_high"]
     who = f"against {person_in_words(row['person'])} in {row['scene']}"
     rate = f"{percent(row['failure_rate'])} (95 %: {interval(low, high)})"
-    fails = f"{with_shield(row['ego'], row['shield'])} fails in {_counts(row)} games {who}: {rate}."
+    fails = f"{with_shield(row['ego'], row['shield'])} fails in {failures_of(row)} games {who}: {rate}."
     return f"{fails} Not answered: {row['reason']}." if row["reason"] else fails
 
 
@@ -106,30 +104,22 @@ def person_in_words(person: str) -> str:
 
 
 def _cell(row: Mapping[Any, Any], address: str) -> FailureCell:
-    collisions, played = row["collisions"], row["episodes"] - row["errors"]
-    injured = row["serious_injuries"] * played
-    risk = injured / collisions if injured > 0.0 and collisions > 0 else math.nan
+    injured = row["serious_injuries"] * played(row)
+    risk = injured / row["collisions"] if injured > 0.0 and row["collisions"] > 0 else math.nan
+    copes = played(row) and not failures(row) and not row["reason"]
     return FailureCell(
         rate=percent(row["failure_rate"]),
-        counts=_counts(row),
+        counts=failures_of(row),
         spans=(),
-        tone=risk_tone(risk) if _failures(row) and not row["reason"] else "none",
+        tone="none" if copes else risk_tone(math.nan if row["reason"] else risk),
         game=address,
     )
-
-
-def _failures(row: Mapping[Any, Any]) -> int:
-    return int(sum(row[each] for each in ("collisions", "rails", "timeouts") if row[each] == row[each]))
-
-
-def _counts(row: Mapping[Any, Any]) -> str:
-    return f"{_failures(row)} of {row['episodes'] - row['errors']}"
 
 
 def _texts(row: Mapping[Any, Any]) -> Iterator[str]:
     yield with_shield(row["scene"], row["shield"])
     yield person_in_words(row["person"]) + ("" if row["person"] in UNTRAINED else f", seed {row['seed']}")
-    yield f"{percent(row['failure_rate'])} ({_counts(row)})"
+    yield f"{percent(row['failure_rate'])} ({failures_of(row)})"
     yield interval(row["failure_rate_low"], row["failure_rate_high"])
     yield percent(row["preventable_rate"])
     yield number(100.0 * row["serious_injuries"], 1)

@@ -111,14 +111,8 @@ def _learning_figure(
         for event in sorted({each for found in events.values() for each in found}):
             for axes in (payoff, failure):
                 axes.axvline(event.steps, color=INK, linewidth=0.8, linestyle=":")
-        first = next(iter(entries.values()))
         if len(entries) > 1:
             payoff.legend(frameon=False, fontsize=8)
-        elif first.get("steps") is not None:
-            payoff.annotate(
-                _end(first), (first["steps"], 1), (0, 3),
-                xycoords=("data", "axes fraction"), textcoords="offset points", ha="right", fontsize=9,
-            )  # fmt: skip
         payoff.set_ylabel("mean payoff")
         payoff.yaxis.set_major_formatter(lambda value, _: short(value))
         failure.set_ylabel("failure rate (%)")
@@ -131,12 +125,6 @@ def _learning_figure(
         stage = training["stage"].iloc[0]
         alternative = f"Learning curve of {stage}: mean payoff and failure rate over training steps; {'; '.join(ends)}"
         return svg(figure, f"curve{place}", alternative)
-
-
-def _end(entry: Mapping[str, Any]) -> str:
-    """Where a curve ends. No text that a run folder brings is drawn."""
-    reasons = {"converged": "stopped early", "budget": "budget used", DID_NOT_LEARN: DID_NOT_LEARN}
-    return f"{reasons.get(str(entry.get('stopped')), 'stopped')}: {steps_text(entry['steps'])}"
 
 
 def stopped(stage: Mapping[str, Any]) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from harness.game.arrays import FloatArray
-from harness.reports.page_template import environment_of, write_page
+from harness.reports.page_template import page_of, write_page
 
 _MARGIN_M = 15.0
 
@@ -56,4 +56,4 @@ class Drawing:
 
 def write_net_page(drawing: Drawing, file: Path) -> None:
     """Write the page. Raises UsageError when the file's name or folder is wrong."""
-    write_page(file, environment_of("reports").get_template("net.html.jinja").render(drawing=drawing))
+    write_page(file, page_of("net", drawing=drawing))

@@ -87,7 +87,7 @@ def _watch(tables: RunTables) -> Iterator[NextStep]:
     command = replay_command(game, tables.several_seeds)
     watched = key(focus.arm, game["seed"], game["episode"])
     yield NextStep(sentence=f"See how {focus.happens}: the worst game.", command=command, game=watched)
-    if focus.failed:
+    if game["ego_failed"] == 1:
         yield NextStep(
             sentence="Find the mildest start at which this game still fails, and keep it as a test.",
             command=command.replace("harness replay", "harness minimise", 1),

@@ -80,7 +80,7 @@ def p_number(p: float) -> str:
 def steps_text(steps: float) -> str:
     """A number of steps, e.g. "150 k" or "1.2 M"."""
     for size, letter in ((1e6, "M"), (1e3, "k")):
-        if abs(steps) >= size:
+        if abs(steps) >= 0.9995 * size:  # it has three digits, and rounds to one of the size
             return f"{steps / size:.3g} {letter}"
     return f"{steps:.3g}"
 

@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from harness.evaluation.competence import DID_NOT_LEARN
+from harness.evaluation.unplayed_games import reasons_of, were_played
 from harness.reports import human_ranges
 from harness.reports.acceptance_wording import acceptance_lines, by_sentence, headline
 from harness.reports.arm_figures import MOST_DOTS
 from harness.reports.arm_glossary import glossary
 from harness.reports.attribution_section import attribution_section
-from harness.reports.cards import CAUTION, card
+from harness.reports.cards import card
 from harness.reports.data_table import table
-from harness.reports.differences import METRIC_WORDS, effect
 from harness.reports.embedding import GameTracks, embedded_games, recorded_document
 from harness.reports.failing_paths import FailingPath, worst_figures
 from harness.reports.failure_table import failure_table
@@ -22,9 +23,8 @@ from harness.reports.game_links import GameLinks
 from harness.reports.learning import learning, searches, stopped
 from harness.reports.manoeuvres import causes_by_game, failures_by_cause, marks_of
 from harness.reports.next_steps import next_steps
-from harness.reports.page_header import header, troubles
-from harness.reports.page_template import CONTENT_POLICY, ELSEWHERE, LIBRARIES, SCRIPTS, environment_of, sources
-from harness.reports.provenance import asked_alone
+from harness.reports.page_template import CONTENT_POLICY, ELSEWHERE, LIBRARIES, SCRIPTS, page_of, sources
+from harness.reports.provenance import QUICK, asked_alone, command_of, facts, made_by, mixed_versions
 from harness.reports.run_tables import RunTables
 from harness.reports.start_section import start_section
 from harness.reports.verdict_wording import as_sentence, planned_in_words
@@ -71,12 +71,12 @@ def render_page(
         GAMES_BYTES,
     )
     links = GameLinks(embedded=texts, episodes=tables.episodes)
-    environment = environment_of("reports")
     arms, pairs = failures_by_cause(tables.of_own_traits(tables.causes), texts)
     steps = next_steps(tables)
-    page = environment.get_template("report.html.jinja").render(
-        **header(tables),
-        **troubles(tables),
+    return page_of(
+        "report",
+        **_header(tables),
+        **_troubles(tables),
         acceptance=_acceptance(tables),
         most_broken=MOST_BROKEN,
         failure_table=failure_table(tables, links),
@@ -87,9 +87,6 @@ def render_page(
         next_steps=steps,
         cards=[card(persona, place, tables, links, scene, paths) for place, persona in enumerate(tables.personas, 1)],
         most_dots=MOST_DOTS if tables.episodes.groupby("arm").size().max() > MOST_DOTS else 0,
-        caution=CAUTION,
-        metrics={metric: words.name for metric, words in METRIC_WORDS.items()},
-        effect=effect,
         planned=planned_in_words(tables),
         embedded=texts,
         left=len(tables.played) - len(texts),
@@ -113,10 +110,43 @@ def render_page(
         human_plots=human_ranges.plots(tables.realism),
         content_policy=CONTENT_POLICY,
         elsewhere=ELSEWHERE.format("[]"),
-        libraries=sources(environment, LIBRARIES),
-        script=sources(environment, SCRIPTS),
+        libraries=sources(LIBRARIES),
+        script=sources(SCRIPTS),
     )
-    return page.strip() + "\n"
+
+
+def _header(tables: RunTables) -> dict[str, Any]:
+    """What the run is: its campaign, command and facts."""
+    manifest = tables.manifest
+    return {
+        "command": command_of(manifest),
+        "made_by": made_by(manifest),
+        "name": manifest.get("name", "campaign"),
+        "facts": facts(manifest, tables.seeds, len(tables.personas)),
+        "quick": QUICK if manifest.get("quick") else "",
+        "trained_before": tables.campaign.get("policies") or "",
+        "several_seeds": tables.several_seeds,
+        "change": tables.change,
+    }
+
+
+def _troubles(tables: RunTables) -> dict[str, Any]:
+    """The banners: what is unfinished, what could not be played, and what makes the numbers mean less."""
+    errored = tables.episodes[~were_played(tables.episodes)]
+    return {
+        "from_tables": tables.is_from_tables,
+        "unfinished": tables.unfinished,
+        "not_learned": [
+            (name, stopped(each)) for name, each in tables.stages.items() if each.get("stopped") == DID_NOT_LEARN
+        ],
+        "mixed": mixed_versions(tables.stages),
+        "errored": errored.groupby(["arm", "seed"], sort=False).size().items(),
+        "errors": len(errored),
+        "varying": list(tables.manifest.get("varying_drivers", {}).items()),
+        "learned_elsewhere": list(tables.manifest.get("learned_elsewhere", {}).items()),
+        "error_reasons": reasons_of(errored["error"]),
+        "ego_games": int(tables.episodes["ego_failed"].notna().sum()),
+    }
 
 
 def _acceptance(tables: RunTables) -> tuple[bool, str, list[Any]] | None:

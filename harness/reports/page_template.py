@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from harness.errors import UsageError
@@ -32,14 +32,14 @@ LIBRARIES = ("vendor/uPlot.iife.min.js", "vendor/dataTables.min.js")
 """Libraries that the page contains as they are published; their licences are beside them."""
 
 
-def environment_of(*folders: str, autoescape: bool = True) -> Environment:
-    """The template environment of folders of the package `harness`; the first that has a template provides it.
+def environment_of(folder: str, autoescape: bool = True) -> Environment:
+    """The template environment of a folder of the package `harness`.
 
     Templates write numbers with the functions of `harness.reports.numbers`, which are filters. `autoescape` is for
     HTML and XML.
     """
     environment = Environment(
-        loader=ChoiceLoader([PackageLoader("harness", folder) for folder in folders]),
+        loader=PackageLoader("harness", folder),
         autoescape=autoescape,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -49,8 +49,14 @@ def environment_of(*folders: str, autoescape: bool = True) -> Environment:
     return environment
 
 
-def sources(environment: Environment, names: Sequence[str]) -> Markup:
+def page_of(template: str, **values: Any) -> str:
+    """A page of the room `reports` as HTML, from its template and what that shows. Equal values give equal text."""
+    return environment_of("reports").get_template(f"{template}.html.jinja").render(values).strip() + "\n"
+
+
+def sources(names: Sequence[str]) -> Markup:
     """Scripts as one text, unchanged: a script is no template."""
+    environment = environment_of("reports")
     assert environment.loader is not None
     texts = [environment.loader.get_source(environment, name)[0].rstrip() for name in names]
     return Markup("\n".join(texts))
@@ -59,8 +65,9 @@ def sources(environment: Environment, names: Sequence[str]) -> Markup:
 def served_page(page: str, games: Sequence[Sequence[Any]], run: str) -> str:
     """The page as a server sends it: with a list of the games that it may fetch from there as `games/KEY.json`.
 
-    `games` have arm, persona, seed, episode, outcome and least time to collision (s, None: none). Raises UsageError for
-    another page; `run` is the folder that the message names.
+    `games` have arm, persona, seed, episode, outcome, least time to collision (s, None: none), the cause of a failure,
+    severity and delta-v (m/s, None: none). Raises UsageError for another page; `run` is the folder that the message
+    names.
     """
     empty = ELSEWHERE.format("[]")
     if CONTENT_POLICY not in page or empty not in page:

@@ -21,8 +21,12 @@ function normal(key) {
 
 const games = new Map(recorded.games.map(game => [keyOf(game), game]));
 // Games that `harness serve` sends when they are first opened; the page as a file knows none.
-for (const [arm, persona, seed, episode, outcome, leastTime] of JSON.parse(document.getElementById("elsewhere").textContent)) {
-  const game = { arm, persona, seed, episode, outcome, leastTime, isElsewhere: true, players: [], background: [], touches: [], marks: [] };
+const elsewhere = JSON.parse(document.getElementById("elsewhere").textContent);
+for (const [arm, persona, seed, episode, outcome, leastTime, cause, severity, deltaV] of elsewhere) {
+  const game = {
+    arm, persona, seed, episode, outcome, leastTime, cause, severity, deltaV,
+    isElsewhere: true, players: [], background: [], touches: [], marks: [],
+  };
   if (!games.has(keyOf(game))) games.set(keyOf(game), game);
 }
 const severalSeeds = new Set([...games.values()].map(game => game.seed)).size > 1;
@@ -153,11 +157,6 @@ function titleOf(game) {
 /** How a game ended, and how severe the collision was. */
 function outcomeOf(game) {
   return (OUTCOMES[game.outcome] ?? game.outcome) + (game.deltaV === null ? "" : `, delta-v ${game.deltaV.toFixed(1)} m/s`);
-}
-
-function describe(game) {
-  const nearest = game.leastTime === null || game.leastTime === 0 ? "" : `, least TTC ${game.leastTime.toFixed(1)} s`;
-  return `game ${game.episode}${severalSeeds ? `, seed ${game.seed}` : ""}: ${OUTCOMES[game.outcome] ?? game.outcome}${nearest}`;
 }
 
 /** The same episode with the other ego; undefined when the page does not contain it. */

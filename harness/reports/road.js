@@ -7,7 +7,7 @@ const repaint = new Set();
 /** The page's colours, for canvases. */
 function readPalette() {
   const style = getComputedStyle(document.documentElement);
-  for (const name of ["paper", "ink", "faint", "line", "grid", "ego", "non-ego", "other", "asphalt", "verge", "mark",
+  for (const name of ["paper", "ink", "faint", "grid", "ego", "non-ego", "other", "asphalt", "verge", "mark",
     "rail", "goal", "lapse", "contact", "mended"]) {
     palette[name] = style.getPropertyValue(`--${name}`).trim();
   }

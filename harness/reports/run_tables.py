@@ -11,7 +11,7 @@ import pandas as pd
 
 from harness.config.campaign import LEARNED, ego_called
 from harness.evaluation.comparisons.acceptance_checks import Check
-from harness.evaluation.comparisons.preventability import by_regulation, sentences_of
+from harness.evaluation.comparisons.preventability import by_regulation
 from harness.evaluation.competence import FINISHED
 from harness.evaluation.game_theory.findings import GameFindings
 from harness.evaluation.rule_book.causes import cause_lines
@@ -31,6 +31,7 @@ from harness.evaluation.strategies import (
     stage_id,
 )
 from harness.evaluation.tables import table_of
+from harness.evaluation.unplayed_games import were_played
 
 Row = Mapping[Any, Any]
 """A row of a table, by column."""
@@ -182,7 +183,7 @@ class RunTables:
     @cached_property
     def played(self) -> pd.DataFrame:
         """The rows of `episodes` that could be played."""
-        return self.episodes[~unplayed(self.episodes)]
+        return self.episodes[were_played(self.episodes)]
 
     @cached_property
     def rates(self) -> Mapping[tuple[str, int], Row]:
@@ -254,10 +255,6 @@ class RunTables:
         """What the driver of the regulation prevents in an arm: the rows of preventability.csv, by training seed."""
         return by_regulation(self.preventability, arm)
 
-    def preventability_of(self, arm: str) -> dict[int, list[str]]:
-        """What reference drivers prevent in an arm in words, by training seed."""
-        return sentences_of(self.preventability, self.reference_drivers, arm)
-
     def who(self, persona: str) -> str:
         """What the ego meets, if it is not one driver with a persona; else empty."""
         if persona in self.crowds:
@@ -270,19 +267,14 @@ def crowds_of(manifest: Mapping[str, Any]) -> Mapping[str, Sequence[str]]:
     return {each["name"]: each["personas"] for each in manifest.get("campaign", {}).get("crowd", ())}
 
 
-def unplayed(episodes: pd.DataFrame) -> pd.Series:
-    """Which games could not be played."""
-    return (episodes["ego_outcome"] == "error") | (episodes["error"] != "")
-
-
 def played(row: Row | None) -> int:
     """Games of an arm that could be played; none when the arm has no row."""
     return 0 if row is None else row["episodes"] - row["errors"]
 
 
 def failures(row: Row) -> int:
-    """How many games of the arm the ego failed."""
-    return int(row["collisions"] + row["rails"] + row["timeouts"])
+    """How many games of the arm the ego failed; 0 where no game with an ego could be played."""
+    return sum(int(row[each]) for each in ("collisions", "rails", "timeouts") if pd.notna(row[each]))
 
 
 def failures_of(row: Row) -> str:

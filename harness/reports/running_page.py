@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from harness.reports.index_page import RELOAD_S, IndexedRun, state_words
-from harness.reports.page_template import environment_of
+from harness.reports.page_template import page_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,15 +33,12 @@ def render_running(
     curves: Sequence[Mapping[str, Any]],
 ) -> str:
     """The page as HTML. `entries` are the stages of the manifest, `curves` those of `learning` in the page's order."""
-    return (
-        environment_of("reports")
-        .get_template("running.html.jinja")
-        .render(
-            run=run,
-            state=state_words(run),
-            running=running,
-            entries=entries,
-            curves=curves,
-            reload_s=RELOAD_S if run.state == "running" else 0,
-        )
+    return page_of(
+        "running",
+        run=run,
+        state=state_words(run),
+        running=running,
+        entries=entries,
+        curves=curves,
+        reload_s=RELOAD_S if run.state == "running" else 0,
     )

@@ -15,12 +15,15 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import sumo
 import traci
 from sumolib.miscutils import getFreeSocketPort
 from traci.exceptions import FatalTraCIError, TraCIException
 
 from harness.errors import SimulationError
 
+SUMO_GUI = Path(sumo.SUMO_HOME) / "bin" / "sumo-gui"
+"""That of the installed package `eclipse-sumo`, the version of the game."""
 _CONNECTS_WITHIN_S = 60.0
 _RETRIES_EVERY_S = 0.1
 _ANSWERS_WITHIN_S = 60.0
@@ -95,19 +98,17 @@ class GuiWindow:
 
 
 @contextlib.contextmanager
-def steered_gui(
-    program: Path, options: list[str], *, display: str | None = None, patient: bool = True
-) -> Iterator[GuiWindow]:
+def steered_gui(options: list[str], *, display: str | None = None, patient: bool = True) -> Iterator[GuiWindow]:
     """Start SUMO-GUI with options on the screen `display` (None: the user's), and end it at the end of the block.
 
     With `patient`, a step has no time limit, because the user may pause SUMO-GUI. Raises SimulationError, with the
     output of SUMO-GUI, if it can't start.
     """
-    environment = os.environ | {"SUMO_HOME": str(_home_of(program))} | ({"DISPLAY": display} if display else {})
+    environment = os.environ | {"SUMO_HOME": sumo.SUMO_HOME} | ({"DISPLAY": display} if display else {})
     port = getFreeSocketPort()
     with tempfile.TemporaryDirectory(prefix="harness-gui-") as folder, tempfile.TemporaryFile() as output:
         errors = Path(folder) / "errors"
-        command = [str(program), *options, "--remote-port", str(port), "--error-log", str(errors)]
+        command = [str(SUMO_GUI), *options, "--remote-port", str(port), "--error-log", str(errors)]
         process = subprocess.Popen(command, env=environment, stdout=output, stderr=output)
         try:
             try:
@@ -120,12 +121,6 @@ def steered_gui(
             yield window
         finally:
             end_process(process)
-
-
-def _home_of(program: Path) -> Path:
-    """SUMO's folder with its data: the parent of `bin`, or another one in the layout of a Linux distribution."""
-    home = program.resolve().parent.parent
-    return home if (home / "data").is_dir() else Path(os.environ.get("SUMO_HOME", "/usr/share/sumo"))
 
 
 def _connect(port: int, process: subprocess.Popen[bytes]) -> Any:

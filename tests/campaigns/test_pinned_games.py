@@ -74,9 +74,8 @@ def test_preventability__every_failure_is_judged_by_every_driver_and_counted(run
     prevented = games.groupby(["arm", "driver"])["prevented_from_start"].sum()
     for row in counts.itertuples():
         assert row.from_start_prevented == prevented[row.arm, row.driver]
-    assert "Could the failures of the naive ego have been prevented?" in (run / "report.html").read_text(
-        encoding="utf-8"
-    )
+    page = (run / "report.html").read_text(encoding="utf-8")
+    assert "Preventable by the careful and competent driver of UN R157" in page
 
 
 def test_preventability__the_course_of_a_driver_that_prevents_a_collision_is_in_the_page(run: Path) -> None:

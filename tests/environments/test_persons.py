@@ -64,7 +64,7 @@ def test_person__is_in_the_trace_and_looks_like_one_in_the_replay(tmp_path: Path
     rows = recorded[recorded["player"] == "walker"]
     assert rows["x_m"].iloc[0] == pytest.approx(60.0, abs=0.2)
     assert rows["x_m"].is_monotonic_increasing
-    drawn = types_of_vehicles(recorded, scene.route_files)["walker"]
+    drawn = types_of_vehicles(recorded, scene.routes.types_xml)["walker"]
     assert (drawn.shape, drawn.length_m, drawn.width_m) == ("pedestrian", LENGTH_M, WIDTH_M)
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from harness.evaluation.unplayed_games import reasons_of
+import pandas as pd
+
+from harness.evaluation.unplayed_games import reasons_of, were_played
 
 
 def test_reasons__errors_that_differ_in_numbers_are_one_reason() -> None:
@@ -22,3 +24,8 @@ def test_reasons__a_long_error_is_one_short_line() -> None:
     (line,) = reasons_of(["x" * 400 + "\n" + "y" * 400])
     assert "\n" not in line
     assert len(line) < 550
+
+
+def test_played__are_games_without_an_error_and_without_the_outcome_of_one() -> None:
+    outcomes, errors = ["goal", "error", "collision", ""], ["", "", "SUMO ended", None]
+    assert were_played(pd.DataFrame({"ego_outcome": outcomes, "error": errors})).tolist() == [True, False, False, True]

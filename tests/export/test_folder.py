@@ -65,6 +65,18 @@ def test_folder__a_trace_that_cannot_be_read_is_not_taken_for_a_folder_that_cann
     assert list(tmp_path.iterdir()) == []
 
 
+def test_folder__that_can_not_be_written_is_named(
+    merge: OpenScene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(file: Path, content: bytes) -> int:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(UsageError, match="out: can't be written: No space left on device"):
+        write_games(games(merge), merge, tmp_path / "out", Formats(csv=True), title="two games")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_formats__name_the_package_that_is_missing(
     merge: OpenScene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -6,7 +6,8 @@ The scene tests/data/merge has two lanes along x, whose centre lines are at y = 
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -71,6 +72,18 @@ def test_neighbours__that_overlap_are_alongside(merge: OpenScene) -> None:
     third = tracks[tracks["frame"] == 4].set_index("id")
     assert (third.loc[1, "rightAlongsideId"], third.loc[1, "rightPrecedingId"]) == (4, 0)
     assert (third.loc[4, "leftAlongsideId"], third.loc[4, "leftPrecedingId"]) == (1, 2)
+
+
+@pytest.mark.parametrize("hand", ["right", "left"])
+def test_neighbours__are_on_the_side_where_they_drive(hand: str, build_net: Callable[..., Path]) -> None:
+    nodes = '<node id="a" x="0" y="0"/><node id="b" x="200" y="0"/>'
+    options = ("--lefthand",) if hand == "left" else ()
+    file = build_net(nodes, '<edge id="ab" from="a" to="b" numLanes="2"/>', "", *options)
+    courses = LaneCourses.read(file)
+    upper, lower = sorted(range(2), key=lambda lane: -courses.lanes.centre_lines[lane][0, 1])  # both go east
+    assert courses.lanes.ids[upper] == ("ab_1" if hand == "right" else "ab_0")
+    assert (courses.left[upper], courses.right[upper]) == (NONE, courses.course[lower])
+    assert (courses.left[lower], courses.right[lower]) == (courses.course[upper], NONE)
 
 
 def test_neighbours__that_overlap_in_the_same_lane_are_neither_ahead_nor_behind() -> None:

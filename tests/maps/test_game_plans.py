@@ -8,14 +8,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 
 from harness.game.road import SPACING_M
 from harness.maps import game_plans
-from harness.maps.candidates import Candidate, CandidateKind, Priority, candidates, following
+from harness.maps.candidates import Candidate, CandidateKind, Priority, candidates, following, onward, way_over
 from harness.maps.game_plans import GamePlan, Plans
 from harness.maps.import_map import import_map
 from harness.maps.planned_routes import PlannedRoute, planned_route
-from harness.road.net.network import read_net
+from harness.road.net.network import lane_line, read_net
+from harness.road.net.route_table import line_over_junction
 from tests.support.repository import REPOSITORY
 from tests.support.scenes import CROSSING_EDGES, CROSSING_NODES, STRAIGHT_EDGES, STRAIGHT_NODES
 
@@ -70,6 +72,17 @@ def test_candidates__a_zebra_crossing_is_crossed_from_both_directions(town: Plan
     zebras = [each for each in candidates(town.net) if each.kind is CandidateKind.ZEBRA]
     assert len(zebras) == 2
     assert all(each.second is None and each.footway is not None for each in zebras)
+
+
+def test_way_over__begins_shortly_before_the_junction_and_ends_shortly_behind_it(town: Plans) -> None:
+    links = [link for edge in town.net.getEdges(withInternal=False) for link in onward(edge)]
+    assert links
+    for link in links:
+        before, behind = lane_line(link.getFromLane()), lane_line(link.getToLane())
+        over = line_over_junction(town.net, link)
+        inside = shapely.LineString(np.concatenate((before[-1:], over, behind[:1]))).length
+        own_m = sum(min(shapely.LineString(line).length, 6.0) for line in (before, behind))
+        assert way_over(town.net, link).length == pytest.approx(inside + own_m)
 
 
 def test_candidates__a_net_without_conflicts_offers_its_roads(build_net: Callable[..., Path]) -> None:

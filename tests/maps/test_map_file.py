@@ -75,6 +75,21 @@ def test_facts__are_those_of_the_file_when_it_is_compressed(tmp_path: Path) -> N
     assert facts_of(packed, MapKind.OSM) == facts_of(MAPS / "town.osm", MapKind.OSM)
 
 
+@pytest.mark.parametrize(
+    ("nodes", "reason"),
+    [
+        ("", ""),
+        ('<node id="1" lat="52.0" lon="-1.0"/>', "lies in Great Britain or Ireland"),
+        ('<node id="1" lat="52.0" lon="13.0"/>', ""),
+    ],
+)
+def test_facts__a_file_lies_where_its_nodes_are_and_without_any_nowhere(
+    nodes: str, reason: str, tmp_path: Path
+) -> None:
+    (tmp_path / "a.osm").write_text(osm(nodes + ROAD.format("")))
+    assert facts_of(tmp_path / "a.osm", MapKind.OSM).on_the_left == reason
+
+
 @pytest.mark.parametrize("encoding", ["foo", "utf-16", "idna", "zlib", "undefined", "", "x" * 3000])
 @pytest.mark.parametrize(("name", "kind"), [("town.osm", MapKind.OSM), ("t_junction.xodr", MapKind.OPENDRIVE)])
 def test_facts__of_a_file_in_another_encoding_are_refused(

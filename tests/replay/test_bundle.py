@@ -111,18 +111,18 @@ def test_scenery__types_that_occur_in_the_colours_of_the_game(merge_net: Path, t
 
 
 def test_contacts__are_found_where_and_when_the_bodies_touch(merge_net: Path, tmp_path: Path) -> None:
-    routes = merge_net.with_name("merge.rou.xml")
-    (crash,) = contacts(collision_game(), types_of_vehicles(collision_game(), [routes]), RAILS)
+    routes = merge_net.with_name("merge.rou.xml").read_text(encoding="utf-8")
+    (crash,) = contacts(collision_game(), types_of_vehicles(collision_game(), routes), RAILS)
     assert crash.time_s == pytest.approx(3.2)
     assert crash.label == "collision at 3.2 s"
     assert 78.0 < crash.x_m < 82.0
     assert -3.0 < crash.y_m < -1.5
 
-    (scrape,) = contacts(rail_game(), types_of_vehicles(rail_game(), [routes]), RAILS)
+    (scrape,) = contacts(rail_game(), types_of_vehicles(rail_game(), routes), RAILS)
     assert scrape.label == "rail at 3.0 s"
     assert scrape.y_m == pytest.approx(0.0)
-    assert contacts(clean_game(), types_of_vehicles(clean_game(), [routes]), RAILS) == []
-    assert contacts(busy_game(), types_of_vehicles(busy_game(), [routes]), RAILS) == []
+    assert contacts(clean_game(), types_of_vehicles(clean_game(), routes), RAILS) == []
+    assert contacts(busy_game(), types_of_vehicles(busy_game(), routes), RAILS) == []
 
 
 @pytest.mark.parametrize(("make", "times"), [(collision_game, ["3.300", "4.400"]), (clean_game, ["17.000"])])
@@ -152,5 +152,5 @@ def test_types__a_walker_and_a_cyclist_look_like_what_they_are() -> None:
         scene = open_scene(REPOSITORY / "networks" / name)
         kinds = [scene.vehicle(player).vehicle_type for player in range(2)]
         trace = pd.DataFrame({"player": ["ego", "non_ego"], "vehicle_type": kinds})
-        drawn = types_of_vehicles(trace, scene.route_files)["non_ego"]
+        drawn = types_of_vehicles(trace, scene.routes.types_xml)["non_ego"]
         assert (drawn.shape, drawn.length_m, drawn.width_m) == looks

@@ -27,13 +27,5 @@ def test_replay__every_frame_is_the_game_that_was_played(wheel: float, outcome: 
     assert game.record["ego_outcome"] == outcome
     recorded = trace(game)
     assert recorded["player"].nunique() >= 4
-    write_replay(
-        recorded,
-        scene.net_file,
-        scene.route_files,
-        tmp_path / "replay",
-        title="a game",
-        step_length_s=scene.world.step_s,
-        rails=scene.rail_lines,
-    )
+    write_replay(recorded, scene, tmp_path / "replay", title="a game")
     assert_plays(tmp_path / "replay", recorded, {name: kind.length_m for name, kind in scene.routes.types.items()})

@@ -10,6 +10,7 @@ from defusedxml import ElementTree
 
 from harness.replay import write_replay
 from harness.replay.scenery import programmes
+from harness.road.scene.open_scene import open_scene
 from tests.support.replays import STEP_S, drive, straight
 from tests.support.repository import REPOSITORY
 from tests.support.scenes import run_sumo_program
@@ -48,8 +49,7 @@ def shown(folder: Path, light: str) -> dict[int, str]:
 
 
 def write(recorded: pd.DataFrame, folder: Path) -> Path:
-    net, routes = (LEFT_ACROSS / f"left_across.{kind}.xml" for kind in ("net", "rou"))
-    write_replay(recorded, net, [routes], folder, title="lights", step_length_s=STEP_S)
+    write_replay(recorded, open_scene(LEFT_ACROSS), folder, title="lights")
     return folder
 
 

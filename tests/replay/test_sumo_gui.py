@@ -19,11 +19,12 @@ from PIL import Image, ImageGrab
 from harness.replay import follow_in_sumo_gui, sumo_gui
 from harness.replay.contacts import contacts
 from harness.replay.gui_settings import choose_view
-from harness.replay.sumo_gui import find_sumo_gui, find_xvfb, virtual_screen
+from harness.replay.sumo_gui import find_xvfb, virtual_screen
 from harness.replay.vehicles import types_of_vehicles
 from harness.sumo import gui
+from harness.sumo.gui import SUMO_GUI
 from tests.support.pictures import blue, orange, require_gui
-from tests.support.replays import GAMES, RAILS, STEP_S, collision_game, write
+from tests.support.replays import GAMES, RAILS, ROUTES, STEP_S, collision_game, write
 
 DIALOGUE_RGB = (212, 208, 200)
 """The colour of SUMO-GUI's dialogues and tool bars."""
@@ -49,7 +50,7 @@ def photograph(folder: Path, screen: str, steps: list[int]) -> list[np.ndarray]:
         for file, step in zip(files, steps, strict=True)
     )
     (folder / "view.xml").write_text(settings.replace("</viewsettings>", taken + "</viewsettings>"))
-    command = [str(find_sumo_gui()), "-c", str(folder / "scene.sumocfg"), "--quit-on-end"]
+    command = [str(SUMO_GUI), "-c", str(folder / "scene.sumocfg"), "--quit-on-end"]
     environment = os.environ | {"DISPLAY": screen}
     for _ in range(5):  # SUMO-GUI dies of SIGSEGV, does not end, or takes pictures of one pixel now and then
         with contextlib.suppress(subprocess.TimeoutExpired):
@@ -64,7 +65,7 @@ def photograph(folder: Path, screen: str, steps: list[int]) -> list[np.ndarray]:
 
 def place(mask: np.ndarray, trace: pd.DataFrame, net: Path) -> tuple[float, float]:
     """The centre of the marked pixels in net coordinates."""
-    found = contacts(trace, types_of_vehicles(trace, [net.with_name("merge.rou.xml")]), RAILS)
+    found = contacts(trace, types_of_vehicles(trace, ROUTES), RAILS)
     view = choose_view(trace, found)
     height, width = mask.shape
     metres = max(view.width_m / width, view.height_m / height)  # per pixel
@@ -93,7 +94,7 @@ def test_gui__prints_the_label_of_a_contact_on_white_above_the_road(
 ) -> None:
     trace = collision_game()
     (picture,) = photograph(write(trace, merge_net, tmp_path / "replay"), screen, [15])
-    found = contacts(trace, types_of_vehicles(trace, [merge_net.with_name("merge.rou.xml")]), RAILS)
+    found = contacts(trace, types_of_vehicles(trace, ROUTES), RAILS)
     view = choose_view(trace, found)
     height, width = picture.shape[:2]
     per_px = max(view.width_m / width, view.height_m / height)
@@ -149,9 +150,7 @@ def test_gui__asks_no_question_in_front_of_the_last_picture(screen: str, merge_n
     settings = re.sub(r"<delay [^>]*>", '<delay value="20"/>', settings)
     settings = settings.replace('<breakpoint time="3.300" />', "")  # of the contact: the halt at the end is left
     (folder / "view.xml").write_text(settings)
-    gui = subprocess.Popen(
-        [str(find_sumo_gui()), "-c", "scene.sumocfg"], cwd=folder, env=os.environ | {"DISPLAY": screen}
-    )
+    gui = subprocess.Popen([str(SUMO_GUI), "-c", "scene.sumocfg"], cwd=folder, env=os.environ | {"DISPLAY": screen})
     try:
         picture = settled(screen)
     finally:

@@ -46,10 +46,24 @@ def test_portrait__is_who_the_person_is_and_what_it_does_not_see():
     document = {"description": "In a hurry.", "perception": perception, "attention": attention}
     assert portrait(document).replace(NO_SPACE, " ") == (
         "In a hurry. It does not glance over the shoulder in 85 % of drives. "
-        "Its eyes leave the road for 4 to 6 s at a time, about every 9 s."
+        "Its eyes leave the road about every 9 s: for 4 to 6 s."
     )
     assert portrait({"description": "In a hurry.", "perception": None, "attention": None}) == "In a hurry."
     assert portrait({}) == ""
+
+
+@pytest.mark.parametrize(
+    ("lapses", "words"),
+    [
+        ({"lapse_s": [4.0, 4.0], "mean_attentive_s": 5.0}, "about every 9 s: for 4 s."),
+        (
+            {"lapse_s": [0.42, 4.0], "mean_attentive_s": 1.5, "lapse_distribution": "lognormal"},
+            "about every 3.1 s: for 1.6 s on average, 0.42 to 4 s in the middle 90 %.",
+        ),
+    ],
+)
+def test_portrait__says_how_long_lapses_are_as_the_profile_does(lapses, words):
+    assert portrait({"attention": lapses}) == f"Its eyes leave the road {words}"
 
 
 def test_near_misses__of_an_ego_without_failures_are_on_its_card():

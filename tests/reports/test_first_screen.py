@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
+
 from harness.evaluation.comparisons.acceptance_checks import Check
 from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.strategies import (
@@ -191,6 +193,18 @@ def test_next_step__is_the_worst_game_unless_a_player_of_it_did_not_learn():
 def test_next_step__is_a_game_of_the_broken_bound():
     step = next_steps(run_of(acceptance=[broken("near_miss_rate", "naive_vs_speedy")]))[0]
     assert step.command.startswith("harness replay . naive_vs_speedy ")
+
+
+@pytest.mark.parametrize("has_failed", [True, False])
+def test_next_steps__offer_to_minimise_a_game_that_the_ego_fails_and_no_other(has_failed):
+    arguments = campaign(personas=["speedy"], failing=LAWFUL)
+    games = arguments["episodes"]
+    of_arm = games["arm"] == "naive_vs_speedy"
+    games["near_miss"] = (of_arm & (games["ego_failed"] == int(has_failed))).astype("Int64")
+    bound = broken("near_miss_rate", "naive_vs_speedy")
+    commands = [each.command for each in next_steps(RunTables(**arguments | {"acceptance": [bound]}))]
+    assert commands[0].startswith("harness replay . naive_vs_speedy ")
+    assert any(each.startswith("harness minimise") for each in commands) == has_failed
 
 
 # --- the sentences ---------------------------------------------------------------------------------

@@ -15,7 +15,7 @@ from harness.evaluation.tables import table_of
 from harness.evaluation.worst_first import choose_games, replay_name, worst_first
 from harness.reports import page as page_module
 from harness.reports.differences import CHANCE, effect, p_values, speed_sentence
-from harness.reports.numbers import duration, number, p_number, p_text, percent, signed
+from harness.reports.numbers import duration, number, p_number, p_text, percent, signed, steps_text
 from harness.reports.page import REPLAYS_SHOWN
 from harness.reports.run_tables import RunTables
 from harness.reports.verdict_wording import NO_ROUND_2, answer, planned_in_words
@@ -295,6 +295,8 @@ def test_numbers__have_a_typographic_form():
     assert kept == ["\N{MINUS SIGN}0.004", "\N{MINUS SIGN}0.05", "0", "0", "0"], "what rounds to 0 keeps its sign"
     durations = ["12.3 s", "1 min 00 s", "3 min 05 s", "1 h 02 min", "–"]
     assert [duration(s) for s in (12.34, 59.99, 185, 3725, None)] == durations
+    steps = {400: "400", 999.6: "1 k", 150_000: "150 k", 999_499: "999 k", 999_500: "1 M", 1_234_567: "1.23 M"}
+    assert {count: steps_text(count) for count in steps} == steps
 
 
 def test_p_values__are_also_shown_after_holms_correction():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import shutil
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import pandas as pd
 from defusedxml import ElementTree
 
 from harness.replay import write_replay
+from harness.road.scene.open_scene import open_scene
 from tests.support.repository import REPOSITORY
 from tests.support.scenes import run_sumo_program
 
@@ -104,8 +106,10 @@ GAMES = {"clean": clean_game, "collision": collision_game, "rail": rail_game, "b
 
 
 def write(trace: pd.DataFrame, net: Path, folder: Path, **changes: object) -> Path:
-    options = {"title": "test game", "step_length_s": STEP_S, "rails": RAILS} | changes
-    write_replay(trace, net, [net.with_name("merge.rou.xml")], folder, **options)  # type: ignore[arg-type]
+    opened = open_scene(REPOSITORY / "tests" / "data" / "merge")
+    routes = replace(opened.routes, types_xml=ROUTES)
+    scene = replace(opened, folder=net.parent, routes=routes, rail_lines=RAILS)
+    write_replay(trace, scene, folder, **{"title": "test game", **changes})  # type: ignore[arg-type]
     return folder
 
 

@@ -16,6 +16,7 @@ from harness.evaluation.comparisons.preventability import TAKES_OVER
 from harness.evaluation.people import judged, judged_outcomes
 from harness.evaluation.strategies import Arm, counterparts
 from harness.evaluation.trace_file import TraceReader
+from harness.evaluation.unplayed_games import were_played
 from harness.evaluation.worst_first import choose_games, worst_first
 from harness.game.arrays import FloatArray
 from harness.game.roles import EGO
@@ -60,7 +61,7 @@ def failing_paths(
 ) -> Iterator[FailingPath]:
     """The last seconds of the games that an ego fails against a person, at most `MOST_PATHS` of an arm, worst first."""
     against = [name for name, arm in arms.items() if arm.ego and arm.non_ego and not arm.is_of_a_trait]
-    failed = episodes[episodes["arm"].isin(against) & (episodes["ego_failed"] == 1) & (episodes["error"] == "")]
+    failed = episodes[episodes["arm"].isin(against) & (episodes["ego_failed"] == 1) & were_played(episodes)]
     reader = TraceReader()
     for game in worst_first(failed).groupby("arm", sort=False).head(MOST_PATHS).itertuples():
         trace = reader.read(traces(game.arm, game.seed), game.episode)
@@ -72,7 +73,7 @@ def path_of(trace: pd.DataFrame, scene: OpenScene, game: Any) -> FailingPath:
     last = int(trace.loc[trace["player"] == "ego", "step"].max())
     shown = trace[trace["step"].between(last - round(SPAN_S / scene.world.step_s), last)].sort_values("step")
     players = {str(role): rows for role, rows in shown.groupby("player") if role in scene.world.roles}
-    touches = contacts(trace, types_of_vehicles(trace, scene.route_files, scene.obstacles), scene.rail_lines)
+    touches = contacts(trace, types_of_vehicles(trace, scene.routes.types_xml, scene.obstacles), scene.rail_lines)
     return FailingPath(
         arm=game.arm,
         persona=game.persona,
@@ -88,7 +89,7 @@ def watching_order(
 ) -> pd.DataFrame:
     """The rows of `episodes` that were played, in the order of `recorded_games`. Games against a person with another
     person's trait are the last, but for examples."""
-    played = episodes[(episodes["error"] == "") & (episodes["ego_outcome"] != "error")]
+    played = episodes[were_played(episodes)]
     rows = {(game.arm, game.seed, game.episode): game.Index for game in played.itertuples()}
     order: dict[Any, None] = dict.fromkeys(rows[game] for game in examples if game in rows)
     own = played[~played["arm"].isin([name for name, arm in arms.items() if arm.is_of_a_trait])]
@@ -113,7 +114,7 @@ def takeovers_of(table: pd.DataFrame) -> Takeovers:
 
 def tracks_of(trace: pd.DataFrame, scene: OpenScene, game: Any, takeover: pd.DataFrame | None = None) -> GameTracks:
     """One game's trace as tracks; `game` is its row of `episodes`, `takeover` the course of a reference driver."""
-    types = types_of_vehicles(trace, scene.route_files, scene.obstacles)
+    types = types_of_vehicles(trace, scene.routes.types_xml, scene.obstacles)
     recorded = game_of(trace, scene)
     measures = {name: getattr(recorded.quantities, name) for name in ("leader_gap_m", "time_to_collision_s")}
     by_name = {str(name): rows.sort_values("step") for name, rows in trace.groupby("player", sort=True)}
@@ -138,7 +139,7 @@ def tracks_of(trace: pd.DataFrame, scene: OpenScene, game: Any, takeover: pd.Dat
         steps=int(trace["step"].max()),
         outcome=judged(game._asdict())[1],
         severity=float(np.nan_to_num(game.severity)),
-        delta_v_mps=_delta_v_mps(game),
+        delta_v_mps=delta_v_of(game),
         players=players,
         background=[
             _track(name, piece, types[name], of_background)
@@ -151,7 +152,7 @@ def tracks_of(trace: pd.DataFrame, scene: OpenScene, game: Any, takeover: pd.Dat
     )
 
 
-def _delta_v_mps(game: Any) -> float | None:
+def delta_v_of(game: Any) -> float | None:
     """The greater change of velocity in the collision of a row of `episodes`; None without one."""
     known = [each for each in (game.ego_delta_v_mps, game.other_delta_v_mps) if np.isfinite(each)]
     return max(known, default=None)

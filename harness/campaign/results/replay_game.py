@@ -25,8 +25,8 @@ from harness.evaluation.rule_book.causes import causes_in_words
 from harness.evaluation.tables import read_csv, rows_in_json
 from harness.evaluation.trace_file import TraceReader
 from harness.evaluation.worst_first import FAILURES, replay_name, worst_first
-from harness.replay import follow_in_sumo_gui, names_in_pictures, write_film, write_replay
-from harness.replay.vehicles import legend
+from harness.game.roles import role_in_words
+from harness.replay import follow_in_sumo_gui, legend, names_in_pictures, write_film, write_replay
 from harness.reports.text_table import add_text_row, text_table
 from harness.road.scene.open_scene import OpenScene, open_scene
 
@@ -70,7 +70,7 @@ def game_table(run: Path, chosen: GameList) -> Table:
     players = ("ego", *people_in(games.columns))
     left = f"page {chosen.page} of {pages}, {number:,} games; {_OTHERS}; " if pages > 1 else ""
     columns = ("arm", "seed", "episode", *players, "cause", "TTC (s)", "severity")
-    headings = [name.replace("non_ego", "non-ego").replace("_", " ") for name in columns]
+    headings = [role_in_words(name) for name in columns]
     table = text_table(
         headings,
         whole={*headings} - {"arm", "cause"},
@@ -132,18 +132,7 @@ class PlayedGame:
 
     def write_replay(self, folder: Path) -> None:
         """Write a folder that SUMO-GUI plays."""
-        write_replay(
-            self.trace,
-            self.scene.net_file,
-            self.scene.route_files,
-            folder,
-            title=self.title,
-            step_length_s=self.scene.world.step_s,
-            names=self.names,
-            rails=self.scene.rail_lines,
-            obstacles=self.scene.obstacles,
-            stripes=self.scene.stripes,
-        )
+        write_replay(self.trace, self.scene, folder, title=self.title, names=self.names)
 
 
 def played_game(run: Path, arm: str, episode: int, seed: int | None) -> PlayedGame:
@@ -204,7 +193,7 @@ def replay_of(game: PlayedGame) -> Iterator[Path]:
 
 
 def watch(game: PlayedGame, console: Console) -> None:
-    """Show a game in SUMO-GUI until its user closes it. Raises UsageError if there is no screen or no SUMO-GUI."""
+    """Show a game in SUMO-GUI until its user closes it. Raises UsageError if there is no screen."""
     with replay_of(game) as replay:
         message = (
             f"SUMO-GUI plays {replay} at half of real time and follows the ego ({legend(game.trace, game.names)}). It "

@@ -14,15 +14,16 @@ from urllib.parse import unquote
 import pandas as pd
 
 from harness.campaign.results.read_run import episodes_of
-from harness.campaign.results.recorded_games import takeovers_of, tracks_of
+from harness.campaign.results.recorded_games import delta_v_of, takeovers_of, tracks_of
 from harness.campaign.results.replay_game import traces_of
 from harness.campaign.storage.run_folder import TAKEN_OVER, RunFolder
 from harness.errors import UsageError
 from harness.evaluation.people import judged
 from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import TraceReader
+from harness.evaluation.unplayed_games import were_played
 from harness.evaluation.worst_first import worst_first
-from harness.reports.embedding import game_text
+from harness.reports.embedding import Causes, game_text, key
 from harness.reports.manoeuvres import causes_by_game, marks_of
 from harness.reports.page_template import SERVED_POLICY, served_page
 from harness.reports.run_tables import crowds_of
@@ -52,10 +53,10 @@ class ServedReport:
         judged = (folder.path / TAKEN_OVER).is_file()
         self._takeovers = takeovers_of(read_csv(folder.result(TAKEN_OVER))) if judged else {}
         self._scene = open_scene(folder.scene)
-        played = worst_first(episodes[(episodes["error"] == "") & (episodes["ego_outcome"] != "error")])
+        played = worst_first(episodes[were_played(episodes)])
         rows: list[Any] = list(played.itertuples())
         self._games = {(game.arm, game.seed, game.episode): game for game in rows}
-        self._page = served_page(page, [_entry(game) for game in self._games.values()], str(folder.path))
+        self._page = served_page(page, [entry_of(game, self._causes) for game in rows], str(folder.path))
 
     def answer(self, path: str) -> tuple[str, bytes] | None:
         """Content type and content of a path; None if there is nothing. Raises UsageError for a game whose traces are
@@ -74,10 +75,16 @@ class ServedReport:
         return game_text(tracks, self._marks, self._causes, self._crowds).encode()
 
 
-def _entry(game: Any) -> list[Any]:
-    least = getattr(game, "ego_min_ttc_s", math.nan)
-    outcome = judged(game._asdict())[1]
-    return [game.arm, game.persona, game.seed, game.episode, outcome, None if pd.isna(least) else round(least, 2)]
+def entry_of(game: Any, causes: Causes) -> list[Any]:
+    """A game of the list, by its row of `episodes`, as `served_page` takes it."""
+    least, delta_v_mps = getattr(game, "ego_min_ttc_s", math.nan), delta_v_of(game)
+    return [
+        *(game.arm, game.persona, game.seed, game.episode, judged(game._asdict())[1]),
+        None if pd.isna(least) else round(least, 2),
+        causes.get(key(game.arm, game.seed, game.episode), ""),
+        0.0 if pd.isna(game.severity) else round(float(game.severity), 2),
+        None if delta_v_mps is None else round(delta_v_mps, 1),
+    ]
 
 
 def server_of(answer: Callable[[str], tuple[str, bytes] | None], port: int) -> ThreadingHTTPServer:

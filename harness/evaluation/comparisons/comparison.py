@@ -45,6 +45,7 @@ from harness.evaluation.columns import TABLES
 from harness.evaluation.competence import Question, ResearchQuestion, Verdict, gate_of
 from harness.evaluation.planned_tests import PRIMARY, About
 from harness.evaluation.tables import typed
+from harness.evaluation.unplayed_games import were_played
 from harness.game.arrays import FloatArray
 
 CONFIDENCE = 0.95
@@ -219,8 +220,7 @@ def measured_values(rows: pd.DataFrame | None, columns: Sequence[str]) -> pd.Dat
     if not values.index.is_unique:
         first = rows.iloc[0]
         raise ValueError(f"arm {first['arm']!r}, seed {first['seed']}: an episode appears more than once")
-    errored = (values["ego_outcome"] == "error") | (values["error"].fillna("") != "")
-    return values[list(columns)].astype("Float64").astype("float64").mask(errored.astype(bool))
+    return values[list(columns)].astype("Float64").astype("float64").where(were_played(values))
 
 
 def paired_t_test(low: FloatArray, high: FloatArray, closed: dict[str, str]) -> dict[str, float]:

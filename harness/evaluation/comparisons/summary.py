@@ -10,6 +10,7 @@ from harness.evaluation.comparisons.comparison import mean_interval, rate_cells
 from harness.evaluation.people import of_people
 from harness.evaluation.severity.closeness import CRITERIA
 from harness.evaluation.tables import table_of, typed
+from harness.evaluation.unplayed_games import were_played
 
 
 def summarise(episodes: pd.DataFrame) -> pd.DataFrame:
@@ -32,7 +33,7 @@ def summarise(episodes: pd.DataFrame) -> pd.DataFrame:
 
 
 def _summary_row(arm: str, persona: str, seed: int, games: pd.DataFrame) -> dict[str, object]:
-    played = games[(games["ego_outcome"] != "error") & (games["error"] == "")]
+    played = games[were_played(games)]
     with_ego = played[played["ego_failed"].notna()]
     outcomes = of_people(played, "outcome")
     took_part = (outcomes != "").to_numpy()

@@ -15,6 +15,7 @@ import numpy as np
 from harness.evaluation.rule_book import thresholds as at
 from harness.evaluation.rule_book.course import SLACK, Course, Span, end_of_run, nearest_lane_m
 from harness.game.arrays import BoolArray, FloatArray
+from harness.game.roles import role_in_words
 
 WALKS, RIDES, DRIVES = "walks", "rides", "drives"
 _MOVES = {"pedestrian": WALKS, "wheelchair": WALKS, "bicycle": RIDES, "scooter": RIDES}  # by class
@@ -108,7 +109,7 @@ def entries(course: Course, body: int, of: int) -> Iterator[tuple[str, Span]]:
         if near or ttc_s <= at.CUT_IN_TTC_S + SLACK or course.leads_to_failure(step, body, of):
             same_until = step + course.steps(at.SAME_WITHIN_S)
             name = name_of(course, body, of, step)
-            role = q.world.roles[of].replace("non_ego", "non-ego").replace("_", " ")
+            role = role_in_words(q.world.roles[of])
             text = f"{words_of(name, lane.side(step), f'the {role}')}, {gap:.1f} m ahead of the {role}"
             text += f", TTC {ttc_s:.1f} s" if math.isfinite(ttc_s) else ""
             last = _settled(lane, q.on_path.left_m[:, of, body], step)

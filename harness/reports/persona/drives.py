@@ -64,13 +64,13 @@ def lapses_per_minute(attention: Attention) -> float:
     return 60.0 / (attention.mean_lapse_s + attention.mean_attentive_s)
 
 
-def free_share(attention: Attention, drive_s: float = DRIVE_S) -> float:
-    """Share of the drives without a lapse.
+def free_share(attention: Attention) -> float:
+    """Share of the drives of `DRIVE_S` without a lapse.
 
     Such a drive starts attentive (1 - lapsed share), and its first lapse, exponentially distributed, begins after its
     end: (1 - lapsed share) exp(-drive / mean attentive stretch).
     """
-    return (1.0 - lapsed_share(attention)) * math.exp(-drive_s / attention.mean_attentive_s)
+    return (1.0 - lapsed_share(attention)) * math.exp(-DRIVE_S / attention.mean_attentive_s)
 
 
 def drift_m(steering_rad: float, lapse_s: float) -> float:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from markupsafe import Markup
 
 from harness.reports.figures import GRID, INK, SERIES, figure_of, svg
-from harness.reports.page_template import environment_of
+from harness.reports.page_template import page_of
 from harness.reports.persona.drives import DRIVE_S, SampleDrive
 from harness.reports.persona.profile import (
     ATTENDS,
@@ -26,7 +26,7 @@ _LINES = ("-", "--", ":", "-.")
 
 
 def render_profile(profile: PersonaProfile) -> str:
-    """The page as text. Equal portraits give equal pages."""
+    """The page as text. Equal profiles give equal pages."""
     functions = []
     for k, each in enumerate(profile.functions, 1):
         words = function_in_words(each)
@@ -35,19 +35,15 @@ def render_profile(profile: PersonaProfile) -> str:
     if profile.persona.human_factors.attention is not None:
         alternative = f"Lapses of attention in {len(profile.drives)} drives of {DRIVE_S:g} s"
         lapses = _drives_figure(profile.drives, alternative)
-    page = (
-        environment_of("reports/persona", "reports")
-        .get_template("profile.html.jinja")
-        .render(
-            profile=profile,
-            persona=profile.persona,
-            headings={"wants": WANTS, "attends": ATTENDS, "decides": DECIDES},
-            formula=FORMULA,
-            functions=functions,
-            drives_figure=lapses,
-        )
+    return page_of(
+        "profile",
+        profile=profile,
+        persona=profile.persona,
+        headings={"wants": WANTS, "attends": ATTENDS, "decides": DECIDES},
+        formula=FORMULA,
+        functions=functions,
+        drives_figure=lapses,
     )
-    return page.strip() + "\n"
 
 
 def _function_figure(function: PayoffFunction, name: str, alternative: str) -> Markup:

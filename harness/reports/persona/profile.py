@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from harness.config.persona import Persona
 from harness.game.human_factors import BLIND_BEHIND_M, BLIND_BESIDE_M, PERSISTENCE_S
-from harness.game.lapses import NOTICED_TTC_S
+from harness.game.lapses import NOTICED_TTC_S, Attention
 from harness.game.payoff_terms import GROUPS
 from harness.reports.persona.drives import (
     DRIFT_SPEED_MPS,
@@ -138,17 +138,23 @@ def _stretch(ends: Sequence[float], unit: str) -> str:
     return f"at {low:.3g}{unit}" if low == high else f"from {low:.3g} to {high:.3g}{unit}"
 
 
+def length_of_lapses(attention: Attention) -> str:
+    """How long lapses of attention are, e.g. "4 to 6 s"."""
+    shortest, longest = attention.lapse_s
+    length = f"{shortest:g} s" if shortest == longest else f"{shortest:g} to {longest:g} s"
+    if attention.lapse_distribution == "lognormal":
+        return f"{attention.mean_lapse_s:.2g} s on average, {length} in the middle 90 %"
+    return length
+
+
 def _attention(persona: Persona, drives: Sequence[SampleDrive]) -> Iterator[str]:
     attention = persona.human_factors.attention
     if attention is None:
         yield NO_LAPSES
         return
-    shortest, longest = attention.lapse_s
-    length = f"{shortest:g} s" if shortest == longest else f"{shortest:g} to {longest:g} s"
-    if attention.lapse_distribution == "lognormal":
-        length = f"{attention.mean_lapse_s:.2g} s on average, {length} in the middle 90 %"
     yield (
-        f"Eyes off the road {percent(lapsed_share(attention))} of the time, in the long run: lapses of {length}, "
+        f"Eyes off the road {percent(lapsed_share(attention))} of the time, in the long run: "
+        f"lapses of {length_of_lapses(attention)}, "
         f"with {attention.mean_attentive_s:g} s of attention between them on average; "
         f"{lapses_per_minute(attention):.2g} lapses per minute."
     )

@@ -27,7 +27,7 @@ def lane_map(net: Net, own: Collection[Edge]) -> dict[str, MapLane]:
 def _map_lane(lane: Lane, known: Collection[str]) -> MapLane:
     links = lane.getOutgoing()
     following = [link.getViaLaneID() or link.getToLane().getID() for link in links]
-    left, right = _neighbours(lane)
+    left, right = neighbours(lane)
     return MapLane(
         edge=lane.getEdge().getID(),
         line=lane_line(lane),
@@ -42,7 +42,7 @@ def _map_lane(lane: Lane, known: Collection[str]) -> MapLane:
     )
 
 
-def _neighbours(lane: Lane) -> tuple[str | None, str | None]:
+def neighbours(lane: Lane) -> tuple[str | None, str | None]:
     """The lanes to the left and to the right. Where traffic keeps to the left, SUMO counts from the left side."""
     lanes, k = lane.getEdge().getLanes(), lane.getIndex()
     outer, inner = lanes[k - 1] if k else None, lanes[k + 1] if k + 1 < len(lanes) else None

@@ -61,10 +61,6 @@ class OpenScene:
     def net_file(self) -> Path:
         return self.folder / self.document.net
 
-    @property
-    def route_files(self) -> list[Path]:
-        return [self.folder / each for each in (self.document.routes, *self.document.additional)]
-
     @cached_property
     def has_background_traffic(self) -> bool:
         """Whether vehicles other than the players may depart."""

@@ -14,9 +14,10 @@ from pathlib import Path
 import pytest
 
 from harness.campaign.results import served_report
-from harness.campaign.results.served_report import PAGE, ServedReport
+from harness.campaign.results.served_report import PAGE, ServedReport, entry_of
 from harness.campaign.storage.run_folder import RunFolder
 from harness.errors import UsageError
+from harness.evaluation.tables import table_of
 from harness.reports.page_template import CONTENT_POLICY, ELSEWHERE, served_page
 from tests.support.serving import read, serving
 from tests.support.tiny import sumo_run
@@ -34,10 +35,23 @@ def test_serve__the_page_lists_every_game_and_may_fetch_it(address: str) -> None
     assert "connect-src 'self'" in page
     listed = json.loads(page.split('id="elsewhere">')[1].split("</script>")[0])
     assert ["naive_alone", "", 1, 0] in [each[:4] for each in listed]
-    for arm, _, seed, episode, outcome, _ in listed:
+    for arm, _, seed, episode, outcome, _, *of_the_list in listed:
         game = json.loads(read(f"{address}/games/{arm},{seed},{episode}.json"))
         assert (game["arm"], game["episode"], game["outcome"]) == (arm, episode, outcome)
+        assert [game["cause"], game["severity"], game["deltaV"]] == of_the_list
         assert game["packed"]
+
+
+def test_serve__the_list_has_what_its_table_shows_and_sorts_by() -> None:
+    game = {"arm": "naive_vs_speedy", "persona": "speedy", "seed": 1, "episode": 3, "error": ""}
+    hit = {"ego_outcome": "collision", "ego_failed": 1, "severity": 2.504, "ego_min_ttc_s": 0.0}
+    hit |= {"ego_delta_v_mps": 1.25, "other_delta_v_mps": 2.51}
+    reached = {"episode": 4, "ego_outcome": "goal", "ego_failed": 0, "ego_min_ttc_s": 1.234}
+    rows = table_of("episodes", [game | hit, game | reached]).itertuples()
+    assert [entry_of(row, {"naive_vs_speedy,1,3": "it did not brake"}) for row in rows] == [
+        ["naive_vs_speedy", "speedy", 1, 3, "collision", 0.0, "it did not brake", 2.5, 2.5],
+        ["naive_vs_speedy", "speedy", 1, 4, "goal", 1.23, "", 0.0, None],
+    ]
 
 
 @pytest.mark.slow

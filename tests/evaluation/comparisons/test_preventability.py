@@ -1,4 +1,4 @@
-"""Counts of prevented failures and their sentences, by hand."""
+"""Counts of prevented failures, by hand."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from harness.evaluation.comparisons.preventability import (
     by_regulation,
     count_prevented,
     prevented_examples,
-    sentences_of,
 )
 from harness.evaluation.tables import table_of, typed
 
@@ -83,23 +82,11 @@ def test_count__shares_are_of_failures_and_rates_of_games(counts: dict[str, dict
     assert (both["from_start_rate_low"], both["from_start_rate_high"]) == pytest.approx((interval.low, interval.high))
 
 
-def test_sentences__name_the_driver_of_the_regulation_and_say_both_verdicts_apart(
-    counts: dict[str, dict[str, Any]],
-) -> None:
+def test_by_regulation__has_the_rows_of_its_driver_alone(counts: dict[str, dict[str, Any]]) -> None:
     table = pd.DataFrame(list(counts.values()))
-    assert sentences_of(table, GAMES, "naive_vs_speedy") == {
-        1: [
-            "Taking over when the danger shows, the careful and competent driver of UN R157 prevents 1 of 2 "
-            "collisions, and none if the other moves on into its line (fuzzy safety model 0, RSS 1; full braking in "
-            "the first moment of danger 2).",
-            "In its place from the start, the careful and competent driver of UN R157 prevents 2 of 3 failures "
-            "(fuzzy safety model 2, RSS 1): 20.0 % of 10 games (95 %: 2.5–55.6 %).",
-            "Full braking prevents the collision until 0.8 s before it (median).",
-        ]
-    }
     (row,) = by_regulation(table, "naive_vs_speedy")
     assert row["from_start_rate"] == pytest.approx(0.2)
-    assert sentences_of(table, GAMES, "retrained_vs_speedy") == {}
+    assert by_regulation(table, "retrained_vs_speedy") == []
 
 
 def test_examples__are_of_the_driver_of_the_regulation_where_it_prevents_any() -> None:
