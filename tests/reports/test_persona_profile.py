@@ -55,12 +55,12 @@ def invented(**changes: Any) -> PersonaProfile:
     return persona_profile(Persona.model_validate(document, strict=False))
 
 
-def drawn(of: PersonaProfile, width: int) -> str:
+def drawn(of: PersonaProfile, width: int, encoding: str = "utf-8") -> str:
     """The output of the terminal without colour, as in a file."""
-    file = io.TextIOWrapper(io.BytesIO(), encoding="utf-8", newline="")
+    file = io.TextIOWrapper(io.BytesIO(), encoding=encoding, newline="")
     show(of, Console(file=file, width=width, color_system=None, legacy_windows=False))
     file.flush()
-    return file.buffer.getvalue().decode()  # type: ignore[attr-defined]
+    return file.buffer.getvalue().decode(encoding)  # type: ignore[attr-defined]
 
 
 # --- payoffs ---
@@ -205,7 +205,10 @@ def test_terminal__fits_the_width_and_has_every_part(file: Path, width: int) -> 
         assert [words for words in expected if words not in text] == []
 
 
-def test_terminal__prints_the_text_of_a_document_unchanged() -> None:
+def test_terminal__is_legible_in_ascii_and_prints_the_text_of_a_document_unchanged() -> None:
+    text = drawn(profile_of(PAPER_SPEEDY), 80, "ascii")
+    assert [words for words in ("alpha x weight", "-5 once") if words not in text] == []
+    assert "?" not in text
     text = drawn(invented(), 120)
     assert "<script>alert('anna')</script> [red]drives[/red]" in text
     assert "one of <b>two</b> people [nobody, [nowhere]]" in text

@@ -25,21 +25,25 @@ from harness.reports.persona.worth import PayoffFunction
 
 EXAMPLES = 9
 """Values of its quantity at which a function is printed."""
+_SPELLING = str.maketrans({
+    "α": "alpha", "₀": "0", "₁": "1", "₂": "2", "Σ": "sum of", "·": "*", "×": "x", "²": "2", "…": "~",
+    "\N{MINUS SIGN}": "-", "’": "'",
+})  # fmt: skip
 
 
 def show(profile: PersonaProfile, console: Console) -> None:
     """Print the profile in the width of the console."""
-    persona = profile.persona
+    persona, plain = profile.persona, console.options.ascii_only
 
     def write(text: str, style: str = "", indent: int = 0) -> None:
-        console.print(Padding(Text(text, style), (0, 0, 0, indent), expand=False), highlight=False)
+        console.print(Padding(Text(_spelled(text, plain), style), (0, 0, 0, indent), expand=False), highlight=False)
 
     def write_table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
         table = Table(show_edge=False, pad_edge=False, header_style="")
         for heading in headings:
-            table.add_column(Text(heading), overflow="fold")
+            table.add_column(Text(_spelled(heading, plain)), overflow="fold")
         for row in rows:
-            table.add_row(*(Text(text) for text in row))
+            table.add_row(*(Text(_spelled(text, plain)) for text in row))
         console.print(table)
 
     write(persona.name, "bold")
@@ -78,3 +82,7 @@ def _drives(profile: PersonaProfile) -> Iterable[Sequence[str]]:
     for k, drive in enumerate(profile.drives, 1):
         check = "" if drive.shoulder_glance else NO_GLANCE_MARK
         yield f"{k}{check}", ", ".join(f"{begin:.3g} to {end:.3g}" for begin, end in drive.lapses) or "none"
+
+
+def _spelled(text: str, plain: bool) -> str:
+    return text.translate(_SPELLING) if plain else text
