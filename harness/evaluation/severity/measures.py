@@ -85,7 +85,7 @@ def needed_mps2(drive: Drive) -> FloatArray:
 @metric(
     "game",
     meaning="Least time headway (THW): gap from the ego's front to the road user ahead, along the ego's route, over "
-    "the ego's speed. The road user overlaps the ego's width and heads less than 90 degrees off the route.",
+    "the ego's speed. The road user overlaps the ego's width and heads less than 90 degrees off the ego's heading.",
     source=f"ISO 34502 and {_CRIME}: THW, with its lanes replaced by the width of the box",
 )
 def min_time_headway_s(drive: Drive) -> float | None:
