@@ -40,6 +40,8 @@ class StartTrials:
     def __init__(self, arm: SeatedArm, episode: int) -> None:
         self._arm = arm
         self._next: FloatArray | None = None
+        self.played = 0
+        """Games played so far."""
         self.last_start: FloatArray = np.empty(0)
         """[2 P] the start of the game that was played last."""
         self._games: Generator[Game, None, None] = assess(arm, repeat(episode), start_from=self._start)
@@ -47,7 +49,7 @@ class StartTrials:
     def play(self, start: FloatArray | None) -> Game:
         """Play the episode from a start [2 P]: the players' positions, then their speeds; None: from the one that is
         drawn for it. Raises SimulationError if SUMO can't load the scene."""
-        self._next = start
+        self._next, self.played = start, self.played + 1
         return next(self._games)
 
     def __enter__(self) -> StartTrials:
