@@ -14,8 +14,8 @@ from harness.evaluation.recorded_game import RecordedGame
 from harness.evaluation.severity import contact
 from harness.evaluation.severity import limits as at
 from harness.game.arrays import BoolArray, FloatArray
-from harness.game.geometry import Box
 from harness.game.quantities import SIGHT_M
+from harness.game.state import Bodies
 
 
 class Headways(NamedTuple):
@@ -51,7 +51,8 @@ def least_pet_s(game: RecordedGame, player: int) -> float:
     """Least post-encroachment time; inf without one."""
     step_s = game.world.step_s
     most = round(at.LONGEST_PET_S / step_s)
-    return float(contact.post_encroachment_s(*boxes_of(game, player), at.CROSSING_RAD, step_s, most))
+    bodies, among = bodies_of(game, player)
+    return float(contact.post_encroachment_s(bodies.boxes, among, player, at.CROSSING_RAD, step_s, most))
 
 
 def _least_ttc_s(game: RecordedGame, player: int) -> float:
@@ -104,11 +105,10 @@ def steps_of(game: RecordedGame, player: int) -> BoolArray:
     return drove
 
 
-def boxes_of(game: RecordedGame, player: int) -> tuple[Box, Box, BoolArray]:
-    """The player's boxes [N], all bodies' [N, B], and which of those are others that are there [N, B]."""
-    bodies, steps = game.bodies, steps_of(game, player)
-    others = Box(*(getattr(bodies, name)[steps] for name in Box._fields))
-    own = Box(*(np.ascontiguousarray(each[:, player]) for each in others))
-    among = bodies.present[steps].copy()
+def bodies_of(game: RecordedGame, player: int) -> tuple[Bodies, BoolArray]:
+    """All bodies in the steps in which the player drove [N, B], and which are others that are there [N, B]."""
+    steps = steps_of(game, player)
+    bodies = Bodies._make(column[steps] for column in game.bodies)
+    among = bodies.present.copy()
     among[:, player] = False
-    return own, others, among
+    return bodies, among

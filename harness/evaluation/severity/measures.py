@@ -10,7 +10,7 @@ from harness.evaluation.column import MAYBE, TEXT
 from harness.evaluation.metrics import Drive, finite, metric
 from harness.evaluation.severity import closeness, contact
 from harness.evaluation.severity import limits as at
-from harness.evaluation.severity.closeness import boxes_of, headways, least_pet_s, least_share, steps_of
+from harness.evaluation.severity.closeness import bodies_of, headways, least_pet_s, least_share
 from harness.evaluation.severity.impact import impact_of
 from harness.game.arrays import FloatArray
 from harness.game.bicycle import GRAVITY_MPS2
@@ -74,12 +74,10 @@ def impact_side(drive: Drive) -> str | None:
 def needed_mps2(drive: Drive) -> FloatArray:
     """[N] the braking that is needed in each step of the drive."""
     game, player = drive.game, drive.player
-    speeds = game.bodies.speed_mps[steps_of(game, player)]
     friction = float(game.quantities.state.friction[0])
     most = min(float(game.world.actuators.max_braking_mps2[player]), friction * GRAVITY_MPS2)
-    own, others, among = boxes_of(game, player)
-    own_speed = np.ascontiguousarray(speeds[:, player])
-    return contact.needed_braking_mps2(own, own_speed, others, speeds, among, most, at.NEEDED_WITHIN_S)
+    bodies, among = bodies_of(game, player)
+    return contact.needed_braking_mps2(bodies.boxes, bodies.speed_mps, among, player, most, at.NEEDED_WITHIN_S)
 
 
 @metric(
