@@ -98,11 +98,12 @@ def metric(
     mean: str = "",
     unit: str = "",
     optional: bool = False,
+    name: str = "",
 ) -> Callable[[Callable[[Any], Value]], Callable[[Any], Value]]:
-    """Enter a function of a `Drive` into `METRICS`: its name is that of the column."""
+    """Enter a function of a `Drive` into `METRICS`: its name is that of the column, unless another one is given."""
 
     def enter(function: Callable[[Any], Value]) -> Callable[[Any], Value]:
-        column = Column(function.__name__, dtype, meaning, source=source, unit=unit, optional=optional)
+        column = Column(name or function.__name__, dtype, meaning, source=source, unit=unit, optional=optional)
         METRICS.append(Metric(column=column, whose=whose, mean=mean, of=function))
         return function
 

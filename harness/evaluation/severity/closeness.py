@@ -75,6 +75,10 @@ class Criterion:
     limit_s: float
     least_s: Callable[[RecordedGame, int], float]
     """The least value of a player in a game; inf without one."""
+    behind: str = ""
+    """Behind which road users alone it counts, after the limit; empty: any."""
+    source: str = ""
+    """Of the limit; empty: our own."""
 
     @property
     def bound(self) -> str:
@@ -86,10 +90,25 @@ class Criterion:
         return self.least_s(game, player) <= self.limit_s
 
 
-TTC = Criterion(name="ttc", words="time to collision", limit_s=at.CONFLICT_TTC_S, least_s=_least_ttc_s)
-PET = Criterion(name="pet", words="post-encroachment time", limit_s=at.CONFLICT_PET_S, least_s=least_pet_s)
-HEADWAY = Criterion(name="headway", words="time headway", limit_s=at.CONFLICT_HEADWAY_S, least_s=_least_headway_s)
-CRITERIA = (TTC, PET, HEADWAY)
+CRITERIA = (
+    Criterion(
+        name="ttc", words="time to collision", limit_s=at.CONFLICT_TTC_S, least_s=_least_ttc_s, source="FHWA-HRT-08-051"
+    ),
+    Criterion(
+        name="pet",
+        words="post-encroachment time",
+        limit_s=at.CONFLICT_PET_S,
+        least_s=least_pet_s,
+        source="Peesapati, Hunter and Rodgers 2013",
+    ),
+    Criterion(
+        name="headway",
+        words="time headway",
+        limit_s=at.CONFLICT_HEADWAY_S,
+        least_s=_least_headway_s,
+        behind=" behind a road user that is not faster than the ego. Behind a faster one the gap opens",
+    ),
+)
 """A game without contact that meets one of them is a near miss; it may meet several."""
 
 

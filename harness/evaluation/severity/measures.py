@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -157,41 +157,21 @@ def time_headway_below_1_s(drive: Drive) -> float:
     meaning="1 if the ego touched no road user and came too close by at least one of the next three criteria.",
 )
 def near_miss(drive: Drive) -> int:
-    return int(any(_comes_too_close(drive, each) for each in closeness.CRITERIA))
+    return int(any(_comes_too_close(each, drive) for each in closeness.CRITERIA))
 
 
-@metric(
-    "game",
-    dtype=MAYBE,
-    meaning=f"1 if the ego touched no road user and came as close as a {closeness.TTC.bound}.",
-    source="FHWA-HRT-08-051",
-)
-def near_miss_ttc(drive: Drive) -> int:
-    return int(_comes_too_close(drive, closeness.TTC))
+def _comes_too_close(criterion: closeness.Criterion, drive: Drive) -> int:
+    return int(drive.outcome is not Outcome.COLLISION and criterion.is_met(drive.game, drive.player))
 
 
-@metric(
-    "game",
-    dtype=MAYBE,
-    meaning=f"1 if the ego touched no road user and came as close as a {closeness.PET.bound}.",
-    source="Peesapati, Hunter and Rodgers 2013",
-)
-def near_miss_pet(drive: Drive) -> int:
-    return int(_comes_too_close(drive, closeness.PET))
-
-
-@metric(
-    "game",
-    dtype=MAYBE,
-    meaning=f"1 if the ego touched no road user and came as close as a {closeness.HEADWAY.bound} behind a road user "
-    "that is not faster than the ego. Behind a faster one the gap opens.",
-)
-def near_miss_headway(drive: Drive) -> int:
-    return int(_comes_too_close(drive, closeness.HEADWAY))
-
-
-def _comes_too_close(drive: Drive, criterion: closeness.Criterion) -> bool:
-    return drive.outcome is not Outcome.COLLISION and criterion.is_met(drive.game, drive.player)
+for _criterion in closeness.CRITERIA:
+    metric(
+        "game",
+        name=f"near_miss_{_criterion.name}",
+        dtype=MAYBE,
+        meaning=f"1 if the ego touched no road user and came as close as a {_criterion.bound}{_criterion.behind}.",
+        source=_criterion.source,
+    )(partial(_comes_too_close, _criterion))
 
 
 @metric(
