@@ -31,7 +31,7 @@ from harness.training.compiled_ppo import CompiledPPO
 from harness.training.early_stopping import Narrowing, by_road, failing_roads, has_converged
 from harness.training.imitation import imitate
 from harness.training.policy_arrays import layers_of, policy_of, put_policy
-from harness.training.regret_starts import RegretReplays, first_scores, replays_of
+from harness.training.regret_starts import RegretReplays, first_scores, pool_of
 from harness.training.training_games import TrainingSpec, attentive_steps, open_games, sample
 
 CURVE_WINDOW_STEPS = 16_384
@@ -170,7 +170,7 @@ def _segment(
 ) -> Progress:
     parts = (*spec.parts, "segment", progress.segments)
     set_random_seed(seed_of(*parts, "learner") % 2**32)
-    replays = replays_of(spec, progress.regret)
+    replays = RegretReplays(pool_of(spec), progress.regret) if progress.regret is not None else None
     sample(spec, environment, progress.steps, *parts, replays=replays)
     environment.reload(seed_of(*parts, "sumo") % 2**31)
     narrowing = Narrowing.of(spec.settings, progress.converged_at)
