@@ -41,8 +41,7 @@ def players(runs: Annotated[list[Path], typer.Argument(metavar="RUN ...")]) -> N
         _print_row("player", "figure", "games", "value (90 % of the games)", "people", "verdict")
         _print_row(*["---"] * 6)
         for row in human_rows(table):
-            value = f"{row.value} ({row.spread})"
-            _print_row(row.player, row.figure, str(row.games), value, row.people, row.realistic)
+            _print_row(row.player, row.figure, str(row.games), row.measured, row.people, row.realistic)
         print()
 
 

@@ -64,15 +64,6 @@ class Game:
         return {**self.played, **(measured(self.recorded) if self.recorded is not None else {})}
 
 
-def assess(
-    arm: SeatedArm,
-    episodes: Iterable[int],
-    start_from: Callable[[int, InitialState], InitialState] = lambda episode, drawn: drawn,
-) -> Generator[Game, None, None]:
-    """Play episodes, given by their numbers, one after the other: `assess_batches` with batches of one."""
-    return assess_batches(arm, ([episode] for episode in episodes), start_from=start_from)
-
-
 def assess_batches(
     arm: SeatedArm,
     batches: Iterable[Sequence[int]],

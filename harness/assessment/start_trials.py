@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import repeat
 
 import numpy as np
 
-from harness.assessment.rollout import Game, assess
+from harness.assessment.rollout import Game, assess_batches
 from harness.assessment.seated_arm import SeatedArm
 from harness.game.arrays import FloatArray
 from harness.game.initial_state import InitialState
@@ -40,14 +40,16 @@ class StartTrials:
     def __init__(self, arm: SeatedArm, episode: int) -> None:
         self._arm = arm
         self._next: FloatArray | None = None
+        self.played = 0
+        """Games played so far."""
         self.last_start: FloatArray = np.empty(0)
         """[2 P] the start of the game that was played last."""
-        self._games: Generator[Game, None, None] = assess(arm, repeat(episode), start_from=self._start)
+        self._games = assess_batches(arm, repeat([episode]), start_from=self._start)
 
     def play(self, start: FloatArray | None) -> Game:
         """Play the episode from a start [2 P]: the players' positions, then their speeds; None: from the one that is
         drawn for it. Raises SimulationError if SUMO can't load the scene."""
-        self._next = start
+        self._next, self.played = start, self.played + 1
         return next(self._games)
 
     def __enter__(self) -> StartTrials:

@@ -280,6 +280,6 @@ def _beside_people(rows: Sequence[HumanRow]) -> Table:
     last = ""
     for row in rows:
         player, last = "" if row.player == last else row.player, row.player
-        words = (player, row.figure, str(row.games), f"{row.value} ({row.spread})", row.people, row.realistic)
+        words = (player, row.figure, str(row.games), row.measured, row.people, row.realistic)
         add_text_row(table, *words, style="red" if row.is_outside else None)
     return table

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from harness.config.scene import Name
 from harness.config.toml_reading import Document
@@ -130,3 +131,19 @@ class Reconfiguration(Document):
     """Share of these games without the non-ego, so that the ego still drives well alone."""
     games_at_once: int = Field(64, ge=1, le=1024)
     """Games played in parallel."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CurvePoint:
+    """A window of the learning curve of a training, and the games that ended in it."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+    steps: Annotated[int, Field(ge=0, le=10**15)]
+    """Steps of the training at the end of the window."""
+    mean_payoff: float
+    failure_rate: float
+    games: Annotated[int, Field(ge=0, le=10**12)]
+    mean_duration_s: float
+    mean_regret: float | None = None
+    """Over the preventable starts that the learner has replayed; None without any."""

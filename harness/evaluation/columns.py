@@ -184,8 +184,8 @@ _TABLES = {
         Column("games", COUNT, "Games in which it could be measured."),
         Column("measured_in", TEXT, "`alone on the road`, or `all` games."),
         Column("value", NUMBER, "The median over the games, their share, the rate or the odds ratio.", unit=OF_METRIC),
-        Column("low", NUMBER, "5 % of the games are below it; of rate and odds ratio, 95 % low.", unit=OF_METRIC),
-        Column("high", NUMBER, "5 % of the games are above it; of rate and odds ratio, 95 % high.", unit=OF_METRIC),
+        Column("low", NUMBER, "5 % quantile; of rate and odds ratio, 95 % low; of a share empty.", unit=OF_METRIC),
+        Column("high", NUMBER, "95 % quantile; of rate and odds ratio, 95 % high; of a share empty.", unit=OF_METRIC),
         Column("people_low", NUMBER, "The low end of the range of people; empty: none.", unit=OF_METRIC),
         Column("people_high", NUMBER, "The high end of the range of people; empty: none.", unit=OF_METRIC),
         Column(

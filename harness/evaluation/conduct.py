@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 
 from harness.evaluation.column import SHARE
 from harness.evaluation.metrics import Drive, finite, metric
-from harness.evaluation.rule_book.course import nearest_lane_m, runs
+from harness.evaluation.rule_book.course import Stretch, nearest_lane_m, runs
 from harness.evaluation.rule_book.thresholds import LANE_CHANGE_M
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.meetings import STANDING_MPS
@@ -25,13 +24,6 @@ _WHEEL_RATIO = 15.0  # of a steering wheel's angle to that of the road wheels
 _REVERSAL_RAD = np.radians(3.0) / _WHEEL_RATIO
 
 
-class LaneChange(NamedTuple):
-    """A change from lane to lane: the last step on the centre of the old lane, and the first on that of the new one."""
-
-    first: int
-    last: int
-
-
 def _in_lane(drive: Drive) -> tuple[FloatArray, FloatArray]:
     """[N] the centre of the nearest lane in each step, and the place of the player, both from the route's line."""
     routes, place_m = drive.game.quantities.world.road.routes, drive.of("lateral_offset_m")
@@ -39,10 +31,10 @@ def _in_lane(drive: Drive) -> tuple[FloatArray, FloatArray]:
     return nearest_lane_m(routes.lane_offset_m[rows], place_m), place_m
 
 
-def lane_changes(drive: Drive) -> list[LaneChange]:
-    """The changes of lane that a player began and ended while it drove. The first 5 % and the last 5 % of the way are
-    those of keeping a lane."""
-    found, (centre_m, place_m) = list[LaneChange](), _in_lane(drive)
+def lane_changes(drive: Drive) -> list[Stretch]:
+    """The changes of lane that a player began and ended while it drove, from the last step on the centre of the old
+    lane to the first on that of the new one. The first 5 % and the last 5 % of the way are those of keeping a lane."""
+    found, (centre_m, place_m) = list[Stretch](), _in_lane(drive)
     moved_m = np.diff(centre_m, prepend=centre_m[:1])
     line_m = np.where(np.abs(moved_m) <= LANE_CHANGE_M, -moved_m, 0.0).cumsum()  # where a lane opens, the line moves
     centre_m, place_m = centre_m + line_m, place_m + line_m
@@ -51,7 +43,7 @@ def lane_changes(drive: Drive) -> list[LaneChange]:
         share = (place_m - old_m) / (new_m - old_m)
         before, behind = np.flatnonzero(share[: step + 1] <= _BEGUN), np.flatnonzero(share[step + 1 :] >= _ENDED)
         if len(before) and len(behind):
-            found.append(LaneChange(int(before[-1]), step + 1 + int(behind[0])))
+            found.append((int(before[-1]), step + 1 + int(behind[0])))
     return found
 
 
@@ -82,8 +74,8 @@ def lane_change_s(drive: Drive) -> float | None:
 def lateral_wander_m(drive: Drive) -> float | None:
     centre_m, place_m = _in_lane(drive)
     keeps = np.isfinite(centre_m)
-    for change in lane_changes(drive):
-        keeps[change.first : change.last + 1] = False
+    for first, last in lane_changes(drive):
+        keeps[first : last + 1] = False
     if keeps.sum() * drive.step_s < _KEEPS_LEAST_S:
         return None
     return finite((place_m - centre_m)[keeps], np.std)

@@ -13,7 +13,6 @@ from harness.evaluation.metrics import Drive, metric
 from harness.evaluation.recorded_game import RecordedGame
 from harness.evaluation.severity.contact import comes_to_touch
 from harness.game.follower import FOLLOWER
-from harness.game.geometry import Box
 from harness.game.outcome import Outcome
 from harness.game.roles import EGO, NON_EGO
 
@@ -45,9 +44,8 @@ def bystander_failed(drive: Drive) -> int | None:
     bystanders = (places >= players) & (places < len(places) - len(game.obstacles))
     if not game.bodies.present[:, bystanders].any():
         return None
-    boxes = Box(*(np.ascontiguousarray(getattr(game.bodies, name)) for name in Box._fields))
     on_foot = np.array([kind.vehicle_class in _ON_FOOT for kind in game.body_kinds])
-    return int(comes_to_touch(boxes, game.bodies.present, bystanders, places != EGO, on_foot).any())
+    return int(comes_to_touch(game.bodies.boxes, game.bodies.present, bystanders, places != EGO, on_foot).any())
 
 
 @metric(

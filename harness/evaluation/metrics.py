@@ -50,17 +50,15 @@ class Drive:
         """Its payoff of each step."""
         return self.game.while_driving(self.game.payoff, self.player)
 
-    @property
-    def shielded(self) -> BoolArray | None:
-        """Whether a shield changed its decision; None without a shield."""
-        flags = self.game.shielded
+    def flags(self, column: str) -> BoolArray | None:
+        """`RecordedGame.flags` of the player."""
+        flags = self.game.flags(column)
         return None if flags is None else self.game.while_driving(flags, self.player)
 
-    def perceived_share(self, column: str) -> float | None:
-        """Share of its steps in which a column of `trace_columns.PERCEIVED` says something."""
-        flags = self.game.perceived(column)
-        said = None if flags is None else self.game.while_driving(flags, self.player)
-        return float(said.mean()) if said is not None and len(said) else None
+    def share(self, column: str) -> float | None:
+        """Share of its steps in which a column has its flag; None where the trace lacks it."""
+        flags = self.flags(column)
+        return float(flags.mean()) if flags is not None and len(flags) else None
 
     @property
     def encounters(self) -> tuple[Encounter, ...]:
@@ -98,11 +96,12 @@ def metric(
     mean: str = "",
     unit: str = "",
     optional: bool = False,
+    name: str = "",
 ) -> Callable[[Callable[[Any], Value]], Callable[[Any], Value]]:
-    """Enter a function of a `Drive` into `METRICS`: its name is that of the column."""
+    """Enter a function of a `Drive` into `METRICS`: its name is that of the column, unless another one is given."""
 
     def enter(function: Callable[[Any], Value]) -> Callable[[Any], Value]:
-        column = Column(function.__name__, dtype, meaning, source=source, unit=unit, optional=optional)
+        column = Column(name or function.__name__, dtype, meaning, source=source, unit=unit, optional=optional)
         METRICS.append(Metric(column=column, whose=whose, mean=mean, of=function))
         return function
 
@@ -208,7 +207,7 @@ def payoff(drive: Drive) -> float:
     optional=True,
 )
 def shield_interventions_per_km(drive: Drive) -> float | None:
-    flags, driven_m = drive.shielded, float(drive.of("speed_mps").sum()) * drive.step_s
+    flags, driven_m = drive.flags("shielded"), float(drive.of("speed_mps").sum()) * drive.step_s
     if flags is None or not driven_m:
         return None
     begins = np.diff(flags.astype(np.int64), prepend=0) > 0
@@ -224,7 +223,7 @@ def shield_interventions_per_km(drive: Drive) -> float | None:
     optional=True,
 )
 def shielded_share(drive: Drive) -> float | None:
-    return float(drive.shielded.mean()) if drive.shielded is not None and len(drive.shielded) else None
+    return drive.share("shielded")
 
 
 @metric(
@@ -236,7 +235,7 @@ def shielded_share(drive: Drive) -> float | None:
     optional=True,
 )
 def lost_share(drive: Drive) -> float | None:
-    return drive.perceived_share("ego_lost")
+    return drive.share("ego_lost")
 
 
 @metric(
@@ -248,4 +247,4 @@ def lost_share(drive: Drive) -> float | None:
     optional=True,
 )
 def ghost_share(drive: Drive) -> float | None:
-    return drive.perceived_share("ego_ghosts")
+    return drive.share("ego_ghosts")

@@ -14,15 +14,16 @@ import numpy as np
 from harness.game.arrays import FloatArray
 
 MOST_GAMES = 200
+"""After so many games no further round of setting coordinates back begins. One that has begun is ended."""
 
 
 def minimise(
     fails: Callable[[FloatArray], bool], failing: FloatArray, passing: FloatArray, tolerance: FloatArray
-) -> tuple[FloatArray, FloatArray, int]:
+) -> tuple[FloatArray, FloatArray]:
     """The smallest change found from `failing` towards `passing`, in all coordinates within `tolerance` (all [D]):
-    two neighbouring starts, one on each side of the failure, and the number of games played to find them.
+    two neighbouring starts, one on each side of the failure.
 
-    `fails` plays a start. Both ends are taken as played. At most `MOST_GAMES` games are played.
+    `fails` plays a start. Both ends are taken as played.
     """
     played = 0
 
@@ -44,7 +45,7 @@ def minimise(
                 near_fail, near_pass = _bisected(plays_badly, failing, without, tolerance)
                 kept = True
                 break
-    return near_fail, near_pass, played
+    return near_fail, near_pass
 
 
 def _bisected(

@@ -206,20 +206,22 @@ def _compared(figure: HumanFigure, games: pd.DataFrame) -> dict[str, object]:
     chosen = games[games["alone"]] if figure.games is Games.ALONE else games
     values = chosen[figure.metric].dropna().to_numpy(dtype=float)
     few = len(values) < LEAST_GAMES
-    value = math.nan
-    if not few:
-        value = float(np.median(values) if figure.at_most is None else np.mean(values <= figure.at_most))
+    value = low = high = math.nan
+    if not few and figure.at_most is not None:
+        value = float(np.mean(values <= figure.at_most))
+    elif not few:
+        value = float(np.median(values))
+        low, high = np.quantile(values, (_TAIL, 1.0 - _TAIL)).tolist()
     comparable = not few and figure.source != ""
     inside = figure.low - _ROUNDING <= value <= figure.high + _ROUNDING
     verdict = (INSIDE if inside else OUTSIDE) if comparable else NOT_COMPARABLE
-    spread = (math.nan, math.nan) if few else np.quantile(values, (_TAIL, 1.0 - _TAIL))
     return {
         "figure": figure.name,
         "games": len(values),
         "measured_in": figure.games.value,
         "value": value,
-        "low": float(spread[0]),
-        "high": float(spread[1]),
+        "low": low,
+        "high": high,
         "people_low": figure.low if math.isfinite(figure.low) else None,
         "people_high": figure.high if math.isfinite(figure.high) else None,
         "realistic": verdict,

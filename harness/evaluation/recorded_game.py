@@ -110,18 +110,12 @@ class RecordedGame:
         """[P] whether the harness moved a player: the steering of SUMO's own models is not known."""
         return np.asarray(self._filled("steers")[:, : len(self.world.roles)].any(0))
 
-    @cached_property
-    def shielded(self) -> BoolArray | None:
-        """[T, P] whether a shield changed a player's decision; None: the arm has no shield."""
-        if "shielded" not in self.trace.columns:
-            return None
-        return self._filled("shielded")[:, : len(self.world.roles)]
-
-    def perceived(self, column: str) -> BoolArray | None:
-        """[T, P] where a column of `trace_columns.PERCEIVED` says something; None: the arm has no perception errors."""
+    def flags(self, column: str) -> BoolArray | None:
+        """[T, P] where `trace_columns.SHIELDED` is true, or a column of `PERCEIVED` says something; None: the arm has
+        no shield, or no perception errors."""
         if column not in self.trace.columns:
             return None
-        return self._filled("", self.trace[column].to_numpy() != "")[:, : len(self.world.roles)]
+        return self._filled("", self.trace[column].to_numpy().astype(bool))[:, : len(self.world.roles)]
 
     def lost_by_ego(self, body: int) -> BoolArray:
         """[T] whether the ego's perception has lost a body."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from harness.game.roles import EGO, NON_EGO, ROLES
@@ -262,6 +263,12 @@ def round_of(strategy: Strategy) -> int:
             return round_of(of)
         case _:
             return 0
+
+
+def egos_made_against(arms: Iterable[Arm], persona: str) -> list[EgoStrategy]:
+    """The egos that rounds or searches against a persona made, of those in some arms, from the first round on."""
+    egos = [arm.ego for arm in arms if isinstance(arm.ego, RetrainedEgo | ReconfiguredEgo)]
+    return sorted((ego for ego in egos if ego.against == persona), key=round_of)
 
 
 def _pair_name(ego: EgoStrategy | None, non_ego: NonEgoStrategy | None) -> str:

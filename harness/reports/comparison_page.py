@@ -184,7 +184,7 @@ def _ends(found: Difference) -> tuple[float, ...]:
 
 def _value(found: Difference, side: Side) -> str:
     if found.is_rate:
-        return f"{round(side.value * side.games)} of {side.games}" if side.games else percent(math.nan)
+        return f"{side.failures} of {side.games}" if side.games else percent(math.nan)
     return f"{number(side.value, 2)}{NO_SPACE}m/s"
 
 

@@ -6,8 +6,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from harness.evaluation.comparisons.comparison import rate_cells
 from harness.evaluation.strategies import (
     Arm,
@@ -27,7 +25,7 @@ from harness.evaluation.strategies import (
 from harness.game.roles import NON_EGO
 from harness.reports.game_links import GameLinks
 from harness.reports.numbers import percent
-from harness.reports.run_tables import Row, RunTables, failures, played
+from harness.reports.run_tables import RunTables, failures, played
 from harness.reports.severity_wording import RISK_TONES, risk_tone
 
 NOBODY, WORST_KNOWN = "nobody", "worst known opponent"
@@ -169,18 +167,10 @@ def _cell(names: Sequence[str], tables: RunTables, links: GameLinks, named: bool
         rate=percent(shares[name]),
         counts=f"{failed:,} of {games:,}",
         spans=[(row["failure_rate"], row["failure_rate_low"], row["failure_rate_high"]) for row in rows],
-        tone=_tone(rows),
+        tone=risk_tone(tables.games_of(name)["mais3_risk_high"].mean()) if failed else "none",
         game=links.worst(name) if failed else "",
         arm=name if named and failed else "",
     )
-
-
-def _tone(rows: Sequence[Row]) -> str:
-    if not sum(map(failures, rows)):
-        return "none"
-    known = [row for row in rows if np.isfinite(row["mais3_risk_high"])]
-    risks, collisions = ([row[name] for row in known] for name in ("mais3_risk_high", "collisions"))
-    return risk_tone(np.average(risks, weights=collisions) if known else np.nan)
 
 
 def _taken_over(persona: str, tables: RunTables) -> FailureCell | None:

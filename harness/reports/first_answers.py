@@ -140,7 +140,7 @@ def _severe(focus: Focus | None, told: Sequence[Told], tables: RunTables) -> Ite
     collision of the run, if it is another one."""
     shown: set[str] = set()
     for _, arms in told:
-        clauses = {arm: severity_clause(made, list(tables.rates_of(arm).values())) for arm, made in arms.items()}
+        clauses = {arm: severity_clause(made, arm, tables) for arm, made in arms.items()}
         found = [arm for arm, clause in clauses.items() if clause]
         for arm in [focus.arm] if focus is not None and focus.arm in found else found[-1:]:
             shown.add(arm)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from markupsafe import Markup
 
-from harness.evaluation.comparisons.run_comparison import FailureRate
+from harness.evaluation.comparisons.run_comparison import Side
 from harness.evaluation.strategies import (
     Arm,
     NaiveEgo,
@@ -36,7 +36,7 @@ class PersonHistory:
 
     ego: str
     person: str
-    rates: Sequence[Mapping[int, FailureRate]]
+    rates: Sequence[Mapping[int, Side]]
     """For each run by training seed; empty where the run has not played it."""
 
     def counts(self, place: int) -> str:
@@ -64,7 +64,7 @@ class PersonHistory:
 
 
 def histories(
-    arms: Sequence[Mapping[str, Arm]], rates: Sequence[Mapping[tuple[str, int], FailureRate]]
+    arms: Sequence[Mapping[str, Arm]], rates: Sequence[Mapping[tuple[str, int], Side]]
 ) -> list[PersonHistory]:
     """The histories of the arms that at least two runs have played, ego by ego, in the order of the runs."""
     named = {name: arm for of_run in arms for name, arm in of_run.items() if _is_shown(arm)}

@@ -38,7 +38,8 @@ class HumanRow:
     figure: str
     games: int
     value: str
-    spread: str
+    measured: str
+    """The value, with the middle 90 % of the games or its 95 % interval where it has one."""
     people: str
     realistic: str
     """With the reason that a persona declares."""
@@ -102,13 +103,14 @@ def _named(rows: pd.DataFrame, realism: pd.DataFrame) -> pd.DataFrame:
 
 
 def _in_words(row: Mapping[Any, Any]) -> HumanRow:
-    figure, realistic = row["figure"], row["realistic"]
+    figure, realistic, value = row["figure"], row["realistic"], _value(row)
+    spread = f" ({_text(figure, row['low'])} to {_text(figure, row['high'])})" if np.isfinite(row["low"]) else ""
     return HumanRow(
         player=row["player"],
         figure=title_of(figure),
         games=row["games"],
-        value=_value(row),
-        spread=f"{_text(figure, row['low'])} to {_text(figure, row['high'])}",
+        value=value,
+        measured=f"{value}{spread}",
         people=_range(figure, row["people_low"], row["people_high"]),
         realistic=f"{realistic}: {row['reason']}" if realistic == DECLARED else realistic,
     )

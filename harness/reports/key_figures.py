@@ -80,7 +80,7 @@ def prevented_clauses(arm: str, verdicts: Mapping[str, str], tables: RunTables) 
 
 
 def _severity(persona: str, tables: RunTables) -> Iterator[KeyFigure]:
-    clauses = [severity_clause(made, list(tables.rates_of(arm).values())) for _, made, arm in egos_of(persona, tables)]
+    clauses = [severity_clause(made, arm, tables) for _, made, arm in egos_of(persona, tables)]
     yield KeyFigure(title=SEVERITY, lines=[clause for clause in clauses if clause])
 
 

@@ -22,12 +22,13 @@ from harness.evaluation.strategies import (
     Arm,
     EgoStrategy,
     NaiveEgo,
+    PersonaNonEgo,
     ReconfiguredEgo,
     RetrainedEgo,
     RobustEgo,
     Strategy,
     against_persona,
-    round_of,
+    egos_made_against,
     stage_id,
 )
 from harness.evaluation.tables import table_of
@@ -215,15 +216,10 @@ class RunTables:
 
     def last_ego(self, persona: str) -> EgoStrategy:
         """The ego of the last round that was played against a persona's non-ego of round 1."""
-        made = [
-            arm.ego
-            for name, arm in self.arms.items()
-            if isinstance(arm.ego, RetrainedEgo | ReconfiguredEgo)
-            and arm.ego.against == persona
-            and arm == against_persona(arm.ego, persona)
-            and self.rates_of(name)
-        ]
-        return max(made, key=round_of, default=self.change.ego(persona))
+        met = PersonaNonEgo(persona=persona)
+        played = [arm for name, arm in self.arms.items() if self.rates_of(name)]
+        made = egos_made_against((arm for arm in played if arm == Arm(ego=arm.ego, non_ego=met)), persona)
+        return made[-1] if made else self.change.ego(persona)
 
     def tests_of(self, question: str, persona: str) -> list[Row]:
         """The rows of `comparisons` on a question about a persona."""

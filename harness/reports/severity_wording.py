@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
+import pandas as pd
 
 from harness.reports.numbers import NO_SPACE, number, percent
-from harness.reports.run_tables import Row
+from harness.reports.run_tables import RunTables
 
 SMALL_DELTA_V_MPS = 3.0
 """Below this change of velocity a collision is called small. Our own: just above 10 km/h."""
@@ -23,10 +22,10 @@ _ROUNDING = 1e-9
 _RISK = "the probability of a serious injury (MAIS3+)"
 
 
-def severity_clause(ego: str, rows: Sequence[Row]) -> str:
-    """Number, delta-v and risk of injury of the collisions of an ego ("naive ego"), from the rows of summary.csv of its
-    arm, one for each training seed; empty without a collision."""
-    rows = [row for row in rows if row["collisions"] and np.isfinite(row["max_delta_v_mps"])]
+def severity_clause(ego: str, arm: str, tables: RunTables) -> str:
+    """Number, delta-v and risk of injury of the collisions of an ego ("naive ego") in an arm, over all training seeds;
+    empty without a collision."""
+    rows = [row for row in tables.rates_of(arm).values() if row["collisions"] and np.isfinite(row["max_delta_v_mps"])]
     if not rows:
         return ""
     counts = [int(row["collisions"]) for row in rows]
@@ -39,7 +38,7 @@ def severity_clause(ego: str, rows: Sequence[Row]) -> str:
         mean_mps = np.average([row["delta_v_mps"] for row in rows], weights=counts)
         means = f"{number(mean_mps, 1)}{NO_SPACE}m/s on average, " if collisions > 1 else ""
         words = f"{which} of the {ego}: delta-v {means}at most {number(most_mps, 1)}{NO_SPACE}m/s"
-    return f"{words}{_risk(rows)}"
+    return f"{words}{_risk(tables.games_of(arm))}"
 
 
 def risk_tone(risk: float) -> str:
@@ -50,12 +49,11 @@ def risk_tone(risk: float) -> str:
     return "small" if risk <= 0.01 + _ROUNDING else "medium" if risk <= 0.1 + _ROUNDING else "severe"
 
 
-def _risk(rows: Sequence[Row]) -> str:
-    known = [row for row in rows if np.isfinite(row["mais3_risk_high"])]
-    if not known:
+def _risk(games: pd.DataFrame) -> str:
+    """The bounds of the mean over the collisions in which they are known, as a clause; empty if they are in none."""
+    low, high = (games[f"mais3_risk_{end}"].mean() for end in ("low", "high"))
+    if np.isnan(high):
         return ""
-    counts = [int(row["collisions"]) for row in known]
-    low, high = (np.average([row[f"mais3_risk_{end}"] for row in known], weights=counts) for end in ("low", "high"))
     if low > 0.0:
         return f"; {_RISK} is {percent(low)} to {percent(high)} (bounds of the mean)"
     return f"; {_RISK} is at most {percent(high)}"

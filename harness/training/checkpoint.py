@@ -17,22 +17,9 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 from stable_baselines3 import PPO
 
+from harness.config.training import CurvePoint
 from harness.files import write_atomically
 from harness.training.regret_starts import RegretScores
-
-
-@dataclass(frozen=True, kw_only=True)
-class CurvePoint:
-    """A window of the learning curve, and the games that ended in it."""
-
-    steps: int
-    """Steps of the training at the end of the window."""
-    mean_payoff: float
-    failure_rate: float
-    games: int
-    mean_duration_s: float
-    mean_regret: float | None = None
-    """Over the preventable starts that the learner has replayed; None without any."""
 
 
 @dataclass(frozen=True, kw_only=True)

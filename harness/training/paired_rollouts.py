@@ -23,8 +23,12 @@ from harness.road.scene.open_scene import OpenScene
 
 @dataclass(frozen=True, kw_only=True)
 class SeededStarts:
-    """The starts of seeded games: start k is the same whoever drives."""
+    """The starts of seeded games of an ego beside people: start k is the same whoever drives the ego."""
 
+    persona: Persona
+    """The ego's."""
+    people: Sequence[Mixture | None]
+    """The drivers of the non-egos."""
     distribution: StartDistribution
     parts: tuple[str | int, ...]
     """They name the random numbers."""
@@ -46,31 +50,19 @@ def seeded_starts(
     human_factors = [[persona.human_factors], *map(factors_of, people)]
     shares, present = [[1.0], *map(shares_of, people)], [1.0, *[1.0 - alone_share] * len(people)]
     distribution = scene.start_distribution(human_factors, present, shares)
-    return SeededStarts(distribution=distribution, parts=parts)
+    return SeededStarts(persona=persona, people=people, distribution=distribution, parts=parts)
 
 
 class PairedRollouts:
     """N seeded games, up to `at_once` of them at once. Game k is the same for every ego."""
 
-    def __init__(
-        self,
-        scene: OpenScene,
-        starts: SeededStarts,
-        *,
-        persona: Persona,
-        people: Sequence[Mixture | None],
-        games: int,
-        at_once: int,
-    ) -> None:
-        """Load SUMO. `persona` is the ego's, `people` are the drivers of the non-egos, as in `starts`.
-
-        Raises SimulationError if SUMO can't load the scene.
-        """
+    def __init__(self, scene: OpenScene, starts: SeededStarts, *, games: int, at_once: int) -> None:
+        """Load SUMO. Raises SimulationError if it can't load the scene."""
         self._scene, self._games, self._starts = scene, games, starts
         self._loads = ceil(games / at_once)
         self._tiles = ceil(games / self._loads)
         self._ego = _CurrentDriver()
-        seats = [(Seat(self._ego, persona.payoff),), *(seats_of(each, paid=False) for each in people)]
+        seats = [(Seat(self._ego, starts.persona.payoff),), *(seats_of(each, paid=False) for each in starts.people)]
         self._arena = Arena(scene, self._tiles, seats)
 
     def play(self, driver: Driver) -> tuple[FloatArray, FloatArray]:

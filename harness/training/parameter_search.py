@@ -79,8 +79,6 @@ def run_search(
     games = PairedRollouts(
         search.scene,
         seeded_starts(search.scene, search.persona, search.people, settings.alone_share, *search.parts, "games"),
-        persona=search.persona,
-        people=search.people,
         games=settings.games,
         at_once=settings.games_at_once,
     )

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
-from math import ceil
 from pathlib import Path
 from typing import Any
 
@@ -20,18 +19,19 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger, configure
 from stable_baselines3.common.utils import set_random_seed
 
+from harness.config.training import CurvePoint
 from harness.drivers.policy_file import Policy
 from harness.environments.vector_env import Finished, JoinedVecEnv
 from harness.game.observation_layout import OF_OTHERS
 from harness.game.outcome import Outcome
 from harness.game.roles import EGO
 from harness.game.seeding import seed_of
-from harness.training.checkpoint import CurvePoint, Progress, read_checkpoint, write_checkpoint
+from harness.training.checkpoint import Progress, read_checkpoint, write_checkpoint
 from harness.training.compiled_ppo import CompiledPPO
 from harness.training.early_stopping import Narrowing, by_road, failing_roads, has_converged
 from harness.training.imitation import imitate
 from harness.training.policy_arrays import layers_of, policy_of, put_policy
-from harness.training.regret_starts import RegretReplays, first_scores, replays_of
+from harness.training.regret_starts import RegretReplays, first_scores, pool_of
 from harness.training.training_games import TrainingSpec, attentive_steps, open_games, sample
 
 CURVE_WINDOW_STEPS = 16_384
@@ -102,7 +102,7 @@ def _converged_at(spec: TrainingSpec, progress: Progress) -> int | None:
     settings = spec.settings
     if not settings.early_convergence or progress.steps >= Narrowing.of(settings, None).start:
         return None
-    attentive = ceil(attentive_steps(spec) / settings.segment_steps)
+    attentive = int(np.ceil(attentive_steps(spec) / settings.segment_steps))
     fails = failing_roads(progress.alone_games, progress.alone_failures)
     return progress.steps if not fails and has_converged(progress.segment_payoffs[attentive:]) else None
 
@@ -170,7 +170,7 @@ def _segment(
 ) -> Progress:
     parts = (*spec.parts, "segment", progress.segments)
     set_random_seed(seed_of(*parts, "learner") % 2**32)
-    replays = replays_of(spec, progress.regret)
+    replays = RegretReplays(pool_of(spec), progress.regret) if progress.regret is not None else None
     sample(spec, environment, progress.steps, *parts, replays=replays)
     environment.reload(seed_of(*parts, "sumo") % 2**31)
     narrowing = Narrowing.of(spec.settings, progress.converged_at)

@@ -17,14 +17,12 @@ Parker-Holder et al., ICML 2022) from the learner's errors of value.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from harness.drivers.car import car_of
-from harness.drivers.mixture import Mixture
 from harness.drivers.protocol import Driver
 from harness.drivers.reference_drivers import PERSONS, lane_width_of, reference_driver
 from harness.game.arrays import BoolArray, FloatArray
@@ -145,32 +143,13 @@ def first_scores(spec: TrainingSpec) -> RegretScores | None:
     world = spec.scene.world
     car, lane_width_m = car_of(world, EGO), lane_width_of(world)
     drivers: list[Driver] = [*(reference_driver(each, car, lane_width_m) for each in PERSONS), spec.best_known]
-    games = PairedRollouts(
-        spec.scene,
-        _starts(spec),
-        persona=spec.personas[0],
-        people=_people(spec),
-        games=POOL,
-        at_once=spec.settings.games,
-    )
-    with closing(games):
+    with closing(PairedRollouts(spec.scene, pool_of(spec), games=POOL, at_once=spec.settings.games)) as games:
         payoffs, failed = zip(*map(games.play, drivers), strict=True)
     return scores_of(np.array(payoffs), np.array(failed))
 
 
-def replays_of(spec: TrainingSpec, scores: RegretScores | None) -> RegretReplays | None:
-    """The replays of a training that has these scores so far; None without scores."""
-    if scores is None:
-        return None
-    return RegretReplays(_starts(spec), scores)
-
-
-def _people(spec: TrainingSpec) -> Sequence[Mixture | None]:
+def pool_of(spec: TrainingSpec) -> SeededStarts:
+    """The starts of a training's pool, in all of which the people of the training take part."""
     place = spec.places[0]
     assert place.player == EGO, "only an ego has reference drivers"
-    return place.drivers[1:]
-
-
-def _starts(spec: TrainingSpec) -> SeededStarts:
-    """The starts of the pool."""
-    return seeded_starts(spec.scene, spec.personas[0], _people(spec), 0.0, *spec.parts, "pool")
+    return seeded_starts(spec.scene, spec.personas[0], place.drivers[1:], 0.0, *spec.parts, "pool")

@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.assessment.rollout import assess
 from harness.drivers.sumo import SumoDriver
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.follower import FOLLOWER
 from harness.road.scene.open_scene import OpenScene, open_scene
-from tests.support.rollouts import Steady, arm, play, trace
+from tests.support.rollouts import Steady, arm, assess, play, trace
 
 EPISODES = 6
 EPISODE_OF_A_CONTACT = 33

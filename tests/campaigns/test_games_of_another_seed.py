@@ -7,7 +7,6 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from harness.assessment.rollout import assess
 from harness.campaign.execution.run_players import RunPlayers
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage
@@ -15,6 +14,7 @@ from harness.campaign.storage.run_folder import RunFolder
 from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import TraceReader
 from tests.support.plans import campaign_of
+from tests.support.rollouts import assess
 from tests.support.shipped import people_seeds
 from tests.support.tiny import REPOSITORY, UNTRAINED, finished
 

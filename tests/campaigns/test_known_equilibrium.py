@@ -29,7 +29,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from harness.assessment.rollout import assess
 from harness.assessment.seated_arm import SeatedArm
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
@@ -47,6 +46,7 @@ from harness.game.observation_layout import LAYOUT, SIZE
 from harness.game.roles import EGO, ROLES
 from harness.game.seeding import parts_of
 from harness.road.scene.open_scene import OpenScene, open_scene
+from tests.support.rollouts import assess
 from tests.support.scenes import build_scene
 from tests.support.shared import built_once
 from tests.support.tiny import finished

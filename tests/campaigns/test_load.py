@@ -28,7 +28,6 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from harness.assessment.rollout import assess
 from harness.campaign.results.recorded_games import recorded_games, scene_drawing
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
@@ -44,7 +43,7 @@ from harness.reports.manoeuvres import MOST_LISTED
 from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.chromium import launched, opener, ready_s, until
 from tests.support.pages import campaign, rendered
-from tests.support.rollouts import Steady, arm, play
+from tests.support.rollouts import Steady, arm, assess, play
 from tests.support.scenes import build_scene, drawn
 from tests.support.tiny import PAPER_MERGE, SPEEDY
 from tests.support.work import assert_work

@@ -12,7 +12,12 @@ from xml.etree import ElementTree
 import pandas as pd
 import pytest
 
+from harness.assessment.rollout import Game
+from harness.assessment.start_trials import StartTrials
+from harness.campaign.execution.pinned_games import PinnedGames
+from harness.campaign.execution.run_players import RunPlayers
 from harness.campaign.results.drawn_starts import drawn_starts
+from harness.campaign.storage.run_folder import RunFolder
 from harness.config.pinned_game import PinnedGame
 from harness.config.toml_reading import read_document
 from harness.errors import NOT_ACCEPTED
@@ -123,6 +128,23 @@ def test_minimise__all_pins_one_game_of_each_kind(run: Path, failed: list[int], 
     games = [read_document(file, PinnedGame) for file in sorted(tmp_path.glob("*.toml"))]
     assert 1 <= len(games) <= len(failed)
     assert sum(game.alike for game in games) == len(failed)
+
+
+def test_minimise__counts_all_games_that_it_plays(
+    run: Path, failed: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The failure played again, the starts of other games that were tried, and the last game among them."""
+    played = list[object]()
+
+    def play(self: StartTrials, start: object) -> Game:
+        played.append(start)
+        return play_one(self, start)
+
+    play_one: Any = StartTrials.play
+    monkeypatch.setattr(StartTrials, "play", play)
+    folder = RunFolder(run)
+    pinning = PinnedGames(folder, RunPlayers(folder, POLICIES), tmp_path)
+    assert pinning.pin(pinning.failure(ARM, shipped.SEED, failed[0])).games == len(played) > 3
 
 
 def test_minimise__says_what_is_wrong(run: Path, failed: list[int]) -> None:

@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from harness.assessment.rollout import assess
 from harness.assessment.seated_arm import SeatedArm
 from harness.campaign.results.run_people import by_who_drove
 from harness.config.campaign import Campaign, Population
@@ -25,7 +24,7 @@ from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.lapses import Attention
 from harness.road.scene.open_scene import OpenScene
-from tests.support.rollouts import Steady
+from tests.support.rollouts import Steady, assess
 
 TEXTING = HumanFactors(attention=Attention(mean_attentive_s=2.0, lapse_s=(1.0, 2.0)))
 

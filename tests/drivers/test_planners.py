@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.assessment.rollout import assess
 from harness.assessment.seated_arm import SeatedArm
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
@@ -29,6 +28,7 @@ from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.external_drivers import install
 from tests.support.other_pythons import require_commonroad, require_ros2
 from tests.support.repository import REPOSITORY
+from tests.support.rollouts import assess
 from tests.support.tiny import CAREFUL, harness
 
 GAMES, SEEN, NOISE = np.array([0, 1]), np.zeros((2, SIZE), dtype=np.float32), np.zeros((2, 2))

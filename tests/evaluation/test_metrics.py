@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -30,10 +31,12 @@ def drive(outcome: Outcome = Outcome.GOAL, steers: bool = True, shielded: Any = 
     }
     series = {name: np.array(values) for name, values in {**of, **changes}.items()}
     shared = {"acceleration_mps2": series["acceleration_mps2"], "payoff": series["payoff"], "encounters": ()}
-    shared |= {"shielded": None if shielded is None else np.array(shielded), "perceived_share": {}.get}
-    return SimpleNamespace(
+    flags = {} if shielded is None else {"shielded": np.array(shielded)}
+    made: Any = SimpleNamespace(
         outcome=outcome, step_s=0.5, game=SimpleNamespace(steers=[steers]), player=0, of=series.__getitem__, **shared
     )
+    made.flags, made.share = flags.get, partial(metrics.Drive.share, made)
+    return made
 
 
 def test_metrics__by_hand() -> None:

@@ -78,6 +78,8 @@ def test_realism__compares_the_share_of_games_where_people_s_figure_is_one() -> 
         "speedy", "latest_red_s_at_most_2"
     ]
     assert (row["value"], row["realistic"]) == (pytest.approx(0.9), INSIDE)
+    assert math.isnan(row["low"])  # a quantile of the metric, in seconds, is no share
+    assert math.isnan(row["high"])
 
 
 def test_realism__too_few_games_or_no_published_range_are_not_compared() -> None:

@@ -137,13 +137,13 @@ def test_impact__is_the_same_in_every_direction_of_the_compass(turned: float) ->
 # --- without a contact ----------------------------------------------------------------------------------------------
 
 
+OWN = Box(0.0, 0.0, 0.0, 5.0, 1.8)
+OTHER = np.tile([False, True], (60, 1))
+
+
 def needed(other: Box, velocity_mps: float, speed_mps: float = 10.0) -> float:
-    own = Box(*(np.array([value]) for value in (0.0, 0.0, 0.0, 5.0, 1.8)))
-    others = Box(*(np.array([[float(value)]]) for value in other))
-    found = needed_braking_mps2(
-        own, np.array([speed_mps]), others, np.array([[velocity_mps]]), np.ones((1, 1), bool), 8.0, 4.0
-    )
-    return float(found[0])
+    boxes = Box(*(np.array([[own, float(value)]]) for own, value in zip(OWN, other, strict=True)))
+    return float(needed_braking_mps2(boxes, np.array([[speed_mps, velocity_mps]]), OTHER[:1], 0, 8.0, 4.0)[0])
 
 
 @pytest.mark.parametrize(
@@ -176,8 +176,8 @@ def presence(x: float, y: float, heading: float, speed: float, steps: int = 60) 
 
 
 def pet(own: Box, other: Box) -> float:
-    others = Box(*(each[:, None] for each in other))
-    return float(post_encroachment_s(own, others, np.ones((len(own.x_m), 1), bool), math.radians(30.0), 0.1, 50))
+    boxes = Box(*(np.stack(columns, axis=1) for columns in zip(own, other, strict=True)))
+    return float(post_encroachment_s(boxes, OTHER, 0, math.radians(30.0), 0.1, 50))
 
 
 def test_post_encroachment__at_a_crossing() -> None:

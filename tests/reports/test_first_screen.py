@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from harness.evaluation.comparisons.acceptance_checks import Check
+from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.strategies import (
     Arm,
@@ -98,6 +99,16 @@ def test_table__warns_of_an_ego_that_fails_where_no_persona_takes_part():
     assert [line.person for line in table_in(run_of(failing={"sumo": 0.05}))["lines"] if line.warns] == [
         "SUMO’s driver"
     ]
+
+
+def test_table__the_tone_of_a_failure_is_the_mean_risk_of_the_collisions_in_which_it_is_known():
+    run = run_of(seeds=(1, 2))
+    episodes = run.episodes.copy()
+    failed = (episodes["arm"] == "naive_vs_speedy") & (episodes["ego_failed"] == 1)
+    episodes.loc[failed & (episodes["seed"] == 1), "mais3_risk_high"] = 0.0
+    episodes.loc[(failed & (episodes["seed"] == 2)).idxmax(), "mais3_risk_high"] = 0.5  # 0.5 / 19: at most 10 %
+    run = replace(run, episodes=episodes, summary=summarise(episodes))
+    assert table_in(run)["lines"][-1].cells[0].tone == "medium"
 
 
 def test_table__the_driver_of_the_regulation_leaves_the_failures_that_it_does_not_prevent():

@@ -24,7 +24,8 @@ CHANGE: dict[str, Any] = {
     "realistic": OUTSIDE,
     "source": "VTTI",
 }
-RED = {**CHANGE, "figure": "latest_red_s_at_most_2", "value": 0.95, "people_low": 0.9, "people_high": None}
+RED = {**CHANGE, "figure": "latest_red_s_at_most_2", "value": 0.95, "low": None, "high": None}
+RED |= {"people_low": 0.9, "people_high": None}
 CRASH = {**CHANGE, "figure": CRASHES, "value": 1.4e6, "low": 0.8e6, "high": 2.5e6, "people_low": None}
 
 DECLARED_CHANGE = {**CHANGE, "realistic": DECLARED, "reason": "It is the driver of the paper."}
@@ -37,9 +38,10 @@ def table(*rows: dict[str, Any]) -> pd.DataFrame:
 
 def test_rows__say_the_value_the_spread_and_the_range_of_people() -> None:
     change, red, crash = human_rows(table(CHANGE, {**RED, "realistic": INSIDE}, {**CRASH, "people_high": 2.91}))
-    assert (change.figure, change.value, change.spread) == ("lane change (s)", "2.2", "1.9 to 2.3")
+    assert (change.figure, change.value, change.measured) == ("lane change (s)", "2.2", "2.2 (1.9 to 2.3)")
     assert (change.people, change.is_outside) == ("3.5 to 8", True)
     assert (red.figure, red.value) == ("passes on red within 2 s of its onset", "95\N{NO-BREAK SPACE}%")
+    assert red.measured == red.value
     assert (red.people, red.is_outside) == ("at least 90\N{NO-BREAK SPACE}%", False)
     assert (crash.figure, crash.value) == ("crashes per million km, alone", "1,400,000")
     assert crash.people == "at most 2.91"

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Iterable, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from harness.assessment.rollout import Game, assess
+from harness.assessment.rollout import Game, assess_batches
 from harness.assessment.seated_arm import SeatedArm
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
@@ -49,6 +49,11 @@ def arm(merge: OpenScene, *drivers: Driver | None, persona: Any = SPEEDY, seed: 
     """An arm in which a careful ego meets a driver of the persona."""
     careful, other = (read_document(file, Persona) for file in (CAREFUL, persona))
     return SeatedArm(name="naive_vs_someone", scene=merge, drivers=seated(drivers, (careful, other)), seed=seed)
+
+
+def assess(assessed: SeatedArm, episodes: Iterable[int]) -> Generator[Game, None, None]:
+    """Play episodes, given by their numbers, one after the other."""
+    return assess_batches(assessed, ([episode] for episode in episodes))
 
 
 def play(assessed: SeatedArm, episodes: int = 3) -> list[Game]:

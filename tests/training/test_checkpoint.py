@@ -16,8 +16,9 @@ from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 from stable_baselines3 import PPO
 
+from harness.config.training import CurvePoint
 from harness.environments.vector_env import ACTION_SPACE, OBSERVATION_SPACE
-from harness.training.checkpoint import CurvePoint, Progress, read_checkpoint, write_checkpoint
+from harness.training.checkpoint import Progress, read_checkpoint, write_checkpoint
 from harness.training.regret_starts import RegretScores
 
 KEY = "key"

@@ -106,7 +106,7 @@ def play(
     arguments = {"games": 7, "at_once": 3} | changes
     careful, people = read_document(CAREFUL, Persona), (other or opponent(),)
     starts = seeded_starts(scene, careful, people, alone_share, "test", 1)
-    games = PairedRollouts(scene, starts, persona=careful, people=people, **arguments)
+    games = PairedRollouts(scene, starts, **arguments)
     try:
         return games.play(driver), games.play(driver)
     finally:

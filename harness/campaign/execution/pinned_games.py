@@ -57,7 +57,7 @@ class Pinned:
     file: Path
     game: PinnedGame
     games: int
-    """Games played to find it."""
+    """Games played to find it, the failure played again among them."""
 
 
 class PinnedGames:
@@ -111,9 +111,8 @@ class PinnedGames:
                 return bool(trials.play(start).record.get("ego_failed", 1))
 
             passing = next((each for each in self._passing(stage, failing) if not fails(each)), None)
-            games = 1
             if passing is not None:
-                failing, passing, games = minimise(fails, failing, passing, _tolerance(failing))
+                failing, passing = minimise(fails, failing, passing, _tolerance(failing))
             last = trials.play(failing)
         starts = {"drawn_start": drawn, "start": failing, "no_failure_from": passing}
         pinned = PinnedGame.model_validate(
@@ -139,7 +138,7 @@ class PinnedGames:
         )
         name = f"{failure.arm}-seed{failure.seed}-{failure.episode:04d}.toml"
         self._write(name, pinned.toml(_COMMENT).encode())
-        return Pinned(file=self._out / name, game=pinned, games=games)
+        return Pinned(file=self._out / name, game=pinned, games=trials.played)
 
     def _failed(self) -> pd.DataFrame:
         return self._episodes[(self._episodes["error"] == "") & (self._episodes["ego_failed"] == 1)]

@@ -17,11 +17,10 @@ from harness.campaign.storage.learned import judged
 from harness.campaign.storage.manifest import is_tuned
 from harness.config.campaign import Campaign
 from harness.evaluation.comparisons.acceptance_checks import Evidence, judge
+from harness.evaluation.comparisons.altered_egos import compare_perception, compare_shielded
 from harness.evaluation.comparisons.comparison import compare, games_by_arm
 from harness.evaluation.comparisons.over_trainings import compare_over_trainings
-from harness.evaluation.comparisons.perception_comparison import compare_perception
 from harness.evaluation.comparisons.preventability import count_prevented
-from harness.evaluation.comparisons.shield_comparison import compare_shielded
 from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.competence import Goals, goals_alone
 from harness.evaluation.game_theory.findings import GameFindings, find

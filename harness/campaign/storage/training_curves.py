@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import asdict
 
 import pandas as pd
-from pydantic import Field, ValidationError
+from pydantic import TypeAdapter, ValidationError
 from safetensors import SafetensorError, safe_open
 
 from harness.campaign.plan.stages import Stage, TrainingStage
 from harness.campaign.storage.run_folder import RunFolder
-from harness.config.toml_reading import Document
+from harness.config.training import CurvePoint
 from harness.errors import UsageError
 from harness.evaluation.tables import joined, read_csv, table_of
 
@@ -19,13 +20,7 @@ CHECKPOINT = "checkpoint.safetensors"
 """The file of a training between two segments, in the folder of its work."""
 
 
-class _Point(Document):
-    steps: int = Field(ge=0, le=10**15)
-    mean_payoff: float
-    failure_rate: float
-    games: int = Field(ge=0, le=10**12)
-    mean_duration_s: float
-    mean_regret: float | None = None
+_POINTS = TypeAdapter(list[CurvePoint])
 
 
 def curves_so_far(folder: RunFolder, stages: Sequence[Stage]) -> pd.DataFrame:
@@ -42,8 +37,8 @@ def _curve(folder: RunFolder, stage: TrainingStage) -> pd.DataFrame:
             return read_csv(table)
         with safe_open(folder.work(stage.id) / CHECKPOINT, framework="np") as file:
             progress = json.loads((file.metadata() or {})["progress"])
-        points = [_Point.model_validate(each).model_dump() for each in progress["curve"]]
+        points = _POINTS.validate_python(progress["curve"])
     except (UsageError, OSError, SafetensorError, LookupError, TypeError, ValueError, RecursionError, ValidationError):
         return table_of("training")
     named = {"stage": stage.name, "persona": stage.persona, "seed": stage.seed, "stopped": ""}
-    return table_of("training", [{**named, **each} for each in points])
+    return table_of("training", [{**named, **asdict(each)} for each in points])

@@ -25,11 +25,9 @@ from harness.evaluation.strategies import (
     EgoStrategy,
     NaiveEgo,
     PersonaNonEgo,
-    ReconfiguredEgo,
-    RetrainedEgo,
     RobustEgo,
     against_persona,
-    round_of,
+    egos_made_against,
     strategy_name,
 )
 
@@ -147,15 +145,10 @@ def judged_ego(judged: JudgedEgo, persona: str, seed: int, evidence: Evidence) -
         return RobustEgo()
     if judged == "naive":
         return NaiveEgo()
-    planned = {
-        arm.ego: (arm.name, seed) in evidence.rows
-        for arm in evidence.arms.values()
-        if isinstance(arm.ego, RetrainedEgo | ReconfiguredEgo) and arm.ego.against == persona
-    }
-    assessed = [ego for ego, found in planned.items() if found]
-    if assessed:
-        return max(assessed, key=round_of)
-    return min(planned, key=round_of, default=NaiveEgo())
+    arms = evidence.arms.values()
+    planned = egos_made_against(arms, persona)
+    assessed = egos_made_against((arm for arm in arms if (arm.name, seed) in evidence.rows), persona)
+    return assessed[-1] if assessed else planned[0] if planned else NaiveEgo()
 
 
 def _measured(bound: str, subject: Subject, evidence: Evidence) -> Iterator[Measured]:

@@ -52,6 +52,11 @@ class Side:
     high: float
     games: int
 
+    @property
+    def failures(self) -> int:
+        """Of a rate: the games that it counts."""
+        return round(self.value * self.games)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Difference:
@@ -144,26 +149,11 @@ class ChangedGame:
     episode: int
 
 
-@dataclass(frozen=True, kw_only=True)
-class FailureRate:
-    """How often the ego of a run fails in an arm, for one training seed, with the Clopper-Pearson interval."""
-
-    failures: int
-    games: int
-    low: float
-    high: float
-
-
-def failure_rates(episodes: pd.DataFrame) -> dict[tuple[str, int], FailureRate]:
-    """The rates of a run by arm and seed, of games of an ego that could be played."""
+def failure_rates(episodes: pd.DataFrame) -> dict[tuple[str, int], Side]:
+    """How often the ego of a run fails, by arm and training seed, of the games that could be played."""
     played = episodes[episodes["ego_failed"].notna()]
-    found = {}
-    for (arm, seed), failed in played.groupby(["arm", "seed"], sort=False)["ego_failed"]:
-        cells = rate_cells("rate", int(failed.sum()), len(failed))
-        found[str(arm), int(seed)] = FailureRate(
-            failures=int(failed.sum()), games=len(failed), low=cells["rate_low"], high=cells["rate_high"]
-        )
-    return found
+    groups = played.groupby(["arm", "seed"], sort=False)["ego_failed"]
+    return {(str(arm), int(seed)): _side("failures", failed.to_numpy(float)) for (arm, seed), failed in groups}
 
 
 def changed_games(runs: Sequence[pd.DataFrame], starts: Sequence[Hashable]) -> list[list[ChangedGame]]:

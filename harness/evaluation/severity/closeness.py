@@ -14,8 +14,8 @@ from harness.evaluation.recorded_game import RecordedGame
 from harness.evaluation.severity import contact
 from harness.evaluation.severity import limits as at
 from harness.game.arrays import BoolArray, FloatArray
-from harness.game.geometry import Box
 from harness.game.quantities import SIGHT_M
+from harness.game.state import Bodies
 
 
 class Headways(NamedTuple):
@@ -51,7 +51,8 @@ def least_pet_s(game: RecordedGame, player: int) -> float:
     """Least post-encroachment time; inf without one."""
     step_s = game.world.step_s
     most = round(at.LONGEST_PET_S / step_s)
-    return float(contact.post_encroachment_s(*boxes_of(game, player), at.CROSSING_RAD, step_s, most))
+    bodies, among = bodies_of(game, player)
+    return float(contact.post_encroachment_s(bodies.boxes, among, player, at.CROSSING_RAD, step_s, most))
 
 
 def _least_ttc_s(game: RecordedGame, player: int) -> float:
@@ -74,6 +75,10 @@ class Criterion:
     limit_s: float
     least_s: Callable[[RecordedGame, int], float]
     """The least value of a player in a game; inf without one."""
+    behind: str = ""
+    """Behind which road users alone it counts, after the limit; empty: any."""
+    source: str = ""
+    """Of the limit; empty: our own."""
 
     @property
     def bound(self) -> str:
@@ -85,10 +90,25 @@ class Criterion:
         return self.least_s(game, player) <= self.limit_s
 
 
-TTC = Criterion(name="ttc", words="time to collision", limit_s=at.CONFLICT_TTC_S, least_s=_least_ttc_s)
-PET = Criterion(name="pet", words="post-encroachment time", limit_s=at.CONFLICT_PET_S, least_s=least_pet_s)
-HEADWAY = Criterion(name="headway", words="time headway", limit_s=at.CONFLICT_HEADWAY_S, least_s=_least_headway_s)
-CRITERIA = (TTC, PET, HEADWAY)
+CRITERIA = (
+    Criterion(
+        name="ttc", words="time to collision", limit_s=at.CONFLICT_TTC_S, least_s=_least_ttc_s, source="FHWA-HRT-08-051"
+    ),
+    Criterion(
+        name="pet",
+        words="post-encroachment time",
+        limit_s=at.CONFLICT_PET_S,
+        least_s=least_pet_s,
+        source="Peesapati, Hunter and Rodgers 2013",
+    ),
+    Criterion(
+        name="headway",
+        words="time headway",
+        limit_s=at.CONFLICT_HEADWAY_S,
+        least_s=_least_headway_s,
+        behind=" behind a road user that is not faster than the ego. Behind a faster one the gap opens",
+    ),
+)
 """A game without contact that meets one of them is a near miss; it may meet several."""
 
 
@@ -104,11 +124,10 @@ def steps_of(game: RecordedGame, player: int) -> BoolArray:
     return drove
 
 
-def boxes_of(game: RecordedGame, player: int) -> tuple[Box, Box, BoolArray]:
-    """The player's boxes [N], all bodies' [N, B], and which of those are others that are there [N, B]."""
-    bodies, steps = game.bodies, steps_of(game, player)
-    others = Box(*(getattr(bodies, name)[steps] for name in Box._fields))
-    own = Box(*(np.ascontiguousarray(each[:, player]) for each in others))
-    among = bodies.present[steps].copy()
+def bodies_of(game: RecordedGame, player: int) -> tuple[Bodies, BoolArray]:
+    """All bodies in the steps in which the player drove [N, B], and which are others that are there [N, B]."""
+    steps = steps_of(game, player)
+    bodies = Bodies._make(column[steps] for column in game.bodies)
+    among = bodies.present.copy()
     among[:, player] = False
-    return own, others, among
+    return bodies, among

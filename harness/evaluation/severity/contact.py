@@ -7,7 +7,7 @@ from math import atan2, cos, hypot, inf, pi, sin
 import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray
-from harness.game.geometry import Box, box_distance, time_to_contact
+from harness.game.geometry import Box, box_distance, other_box, time_to_contact
 from harness.game.jit import compiled
 
 _HORIZON_S = 10.0  # a contact that would be later is avoided
@@ -49,30 +49,21 @@ def impact_angle_rad(a: Box, b: Box, velocity_x_mps: float, velocity_y_mps: floa
 
 @compiled
 def needed_braking_mps2(
-    own: Box,
-    own_speed_mps: FloatArray,
-    others: Box,
-    other_speed_mps: FloatArray,
-    among: BoolArray,
-    most_mps2: float,
-    within_s: float,
+    boxes: Box, speed_mps: FloatArray, among: BoolArray, player: int, most_mps2: float, within_s: float
 ) -> FloatArray:
     """[T] the least constant braking (m/s^2), from each moment on, that avoids contact with every other box that the
-    own one would touch within `within_s` at constant headings and speeds; 0 where there is none.
+    player's would touch within `within_s` at constant headings and speeds; 0 where there is none.
 
-    Boxes own [T], others [T, B]; among [T, B]. The others keep their velocities. `most_mps2` where no braking up to it
-    avoids the contact. An other box that would also touch the own one if it stood still is left out: braking is no
-    remedy against it.
+    Boxes and speeds [T, B], the player's among them; among [T, B] are the others. The others keep their velocities.
+    `most_mps2` where no braking up to it avoids the contact. An other box that would also touch the player's if it
+    stood still is left out: braking is no remedy against it.
     """
-    needed = np.zeros(len(own_speed_mps))
+    needed = np.zeros(len(among))
     for t, b in np.ndindex(among.shape):
         if not among[t, b]:
             continue
-        a = Box(own.x_m[t], own.y_m[t], own.heading_rad[t], own.length_m[t], own.width_m[t])
-        heading = others.heading_rad[t, b]
-        other = Box(others.x_m[t, b], others.y_m[t, b], heading, others.length_m[t, b], others.width_m[t, b])
-        velocity_x, velocity_y = other_speed_mps[t, b] * cos(heading), other_speed_mps[t, b] * sin(heading)
-        speed = own_speed_mps[t]
+        a, other, speed = other_box(boxes, t, player), other_box(boxes, t, b), speed_mps[t, player]
+        velocity_x, velocity_y = speed_mps[t, b] * cos(other.heading_rad), speed_mps[t, b] * sin(other.heading_rad)
         contact_s = time_to_contact(
             a, other, velocity_x - speed * cos(a.heading_rad), velocity_y - speed * sin(a.heading_rad)
         )
@@ -119,29 +110,25 @@ def _avoids(
 
 @compiled
 def post_encroachment_s(
-    own: Box, others: Box, among: BoolArray, crossing_rad: float, step_s: float, most: int
+    boxes: Box, among: BoolArray, player: int, crossing_rad: float, step_s: float, most: int
 ) -> float:
-    """Least time (s) between the presence of the own box and of another at one place, whichever is first, if their
+    """Least time (s) between the presence of the player's box and of another at one place, whichever is first, if their
     headings there differ by at least `crossing_rad`; inf if it is more than `most` steps.
 
-    Boxes own [T], others [T, B]; among [T, B] whether each is there.
+    Boxes [T, B], the player's among them; among [T, B] whether each is another that is there.
     """
     least = most + 1
-    steps = len(own.x_m)
+    steps = len(among)
     for b in range(among.shape[1]):
         for t in range(steps):
-            a = Box(own.x_m[t], own.y_m[t], own.heading_rad[t], own.length_m[t], own.width_m[t])
+            a = other_box(boxes, t, player)
             for u in range(max(t - least + 1, 0), min(t + least, steps)):
                 if not among[u, b]:
                     continue
-                heading, length, width = others.heading_rad[u, b], others.length_m[u, b], others.width_m[u, b]
-                other = Box(others.x_m[u, b], others.y_m[u, b], heading, length, width)
-                radii = 0.5 * (hypot(a.length_m, a.width_m) + hypot(other.length_m, other.width_m))
-                if abs(a.x_m - other.x_m) > radii or abs(a.y_m - other.y_m) > radii:
-                    continue
+                other = other_box(boxes, u, b)
                 if cos(a.heading_rad - other.heading_rad) > cos(crossing_rad) or abs(t - u) >= least:
                     continue
-                if box_distance(a, other) <= 0.0:
+                if _touch(a, other):
                     least = abs(t - u)
     return least * step_s if least <= most else inf
 
@@ -164,16 +151,16 @@ def comes_to_touch(
             if not (present[t, a] and present[t, b]):
                 apart = False
                 continue
-            own = Box(
-                boxes.x_m[t, a], boxes.y_m[t, a], boxes.heading_rad[t, a], boxes.length_m[t, a], boxes.width_m[t, a]
-            )
-            other = Box(
-                boxes.x_m[t, b], boxes.y_m[t, b], boxes.heading_rad[t, b], boxes.length_m[t, b], boxes.width_m[t, b]
-            )
-            reach_m = 0.5 * (hypot(own.length_m, own.width_m) + hypot(other.length_m, other.width_m))
-            touch = hypot(own.x_m - other.x_m, own.y_m - other.y_m) <= reach_m and box_distance(own, other) <= 0.0
+            touch = _touch(other_box(boxes, t, a), other_box(boxes, t, b))
             if touch and apart:
                 found[a] = True
                 break
             apart = not touch
     return found
+
+
+@compiled
+def _touch(a: Box, b: Box) -> bool:
+    """Whether two boxes share a point."""
+    reach_m = 0.5 * (hypot(a.length_m, a.width_m) + hypot(b.length_m, b.width_m))
+    return hypot(a.x_m - b.x_m, a.y_m - b.y_m) <= reach_m and box_distance(a, b) <= 0.0

@@ -24,7 +24,7 @@ NEEDED_WITHIN_S = 4.0
 """Braking is needed for a contact that is at most this far away. Van der Horst and Hogema (1993), "Time-to-collision
 and collision avoidance systems": 4 s separates drivers in danger from drivers in control."""
 LEADER_TURNED_RAD = math.radians(90.0)
-"""A road user at a larger angle to the way crosses it, and is not followed. Our own."""
+"""A road user that heads at a larger angle to the ego is not followed. Our own."""
 _PERSON_KG = 70.0
 _CAR_KG = 1500.0
 MASS_KG: Mapping[str, float] = {

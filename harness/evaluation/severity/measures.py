@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from harness.evaluation.column import MAYBE, TEXT
 from harness.evaluation.metrics import Drive, finite, metric
 from harness.evaluation.severity import closeness, contact
 from harness.evaluation.severity import limits as at
-from harness.evaluation.severity.closeness import boxes_of, headways, least_pet_s, least_share, steps_of
+from harness.evaluation.severity.closeness import bodies_of, headways, least_pet_s, least_share
 from harness.evaluation.severity.impact import impact_of
 from harness.game.arrays import FloatArray
 from harness.game.bicycle import GRAVITY_MPS2
@@ -74,18 +74,16 @@ def impact_side(drive: Drive) -> str | None:
 def needed_mps2(drive: Drive) -> FloatArray:
     """[N] the braking that is needed in each step of the drive."""
     game, player = drive.game, drive.player
-    speeds = game.bodies.speed_mps[steps_of(game, player)]
     friction = float(game.quantities.state.friction[0])
     most = min(float(game.world.actuators.max_braking_mps2[player]), friction * GRAVITY_MPS2)
-    own, others, among = boxes_of(game, player)
-    own_speed = np.ascontiguousarray(speeds[:, player])
-    return contact.needed_braking_mps2(own, own_speed, others, speeds, among, most, at.NEEDED_WITHIN_S)
+    bodies, among = bodies_of(game, player)
+    return contact.needed_braking_mps2(bodies.boxes, bodies.speed_mps, among, player, most, at.NEEDED_WITHIN_S)
 
 
 @metric(
     "game",
     meaning="Least time headway (THW): gap from the ego's front to the road user ahead, along the ego's route, over "
-    "the ego's speed. The road user overlaps the ego's width and heads less than 90 degrees off the route.",
+    "the ego's speed. The road user overlaps the ego's width and heads less than 90 degrees off the ego's heading.",
     source=f"ISO 34502 and {_CRIME}: THW, with its lanes replaced by the width of the box",
 )
 def min_time_headway_s(drive: Drive) -> float | None:
@@ -159,41 +157,21 @@ def time_headway_below_1_s(drive: Drive) -> float:
     meaning="1 if the ego touched no road user and came too close by at least one of the next three criteria.",
 )
 def near_miss(drive: Drive) -> int:
-    return int(any(_comes_too_close(drive, each) for each in closeness.CRITERIA))
+    return int(any(_comes_too_close(each, drive) for each in closeness.CRITERIA))
 
 
-@metric(
-    "game",
-    dtype=MAYBE,
-    meaning=f"1 if the ego touched no road user and came as close as a {closeness.TTC.bound}.",
-    source="FHWA-HRT-08-051",
-)
-def near_miss_ttc(drive: Drive) -> int:
-    return int(_comes_too_close(drive, closeness.TTC))
+def _comes_too_close(criterion: closeness.Criterion, drive: Drive) -> int:
+    return int(drive.outcome is not Outcome.COLLISION and criterion.is_met(drive.game, drive.player))
 
 
-@metric(
-    "game",
-    dtype=MAYBE,
-    meaning=f"1 if the ego touched no road user and came as close as a {closeness.PET.bound}.",
-    source="Peesapati, Hunter and Rodgers 2013",
-)
-def near_miss_pet(drive: Drive) -> int:
-    return int(_comes_too_close(drive, closeness.PET))
-
-
-@metric(
-    "game",
-    dtype=MAYBE,
-    meaning=f"1 if the ego touched no road user and came as close as a {closeness.HEADWAY.bound} behind a road user "
-    "that is not faster than the ego. Behind a faster one the gap opens.",
-)
-def near_miss_headway(drive: Drive) -> int:
-    return int(_comes_too_close(drive, closeness.HEADWAY))
-
-
-def _comes_too_close(drive: Drive, criterion: closeness.Criterion) -> bool:
-    return drive.outcome is not Outcome.COLLISION and criterion.is_met(drive.game, drive.player)
+for _criterion in closeness.CRITERIA:
+    metric(
+        "game",
+        name=f"near_miss_{_criterion.name}",
+        dtype=MAYBE,
+        meaning=f"1 if the ego touched no road user and came as close as a {_criterion.bound}{_criterion.behind}.",
+        source=_criterion.source,
+    )(partial(_comes_too_close, _criterion))
 
 
 @metric(

@@ -14,11 +14,12 @@ from harness.campaign.plan.stages import TrainingStage
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
+from harness.config.training import CurvePoint
 from harness.drivers.policy_file import LearnedDriver, write_policy
 from harness.evaluation.tables import read_csv
 from harness.game.roles import EGO
 from harness.road.scene.open_scene import open_scene
-from harness.training.checkpoint import CurvePoint, Progress
+from harness.training.checkpoint import Progress
 from harness.training.ppo import TrainingResult
 from harness.training.training_games import TrainingSpec
 from tests.support.plans import campaign_of, stages_of

@@ -99,6 +99,14 @@ def test_judged_ego__is_that_of_the_last_round_that_was_played() -> None:
     assert judged_ego("robust", "speedy", 1, played) == RobustEgo()
 
 
+def test_judged_ego__is_that_of_the_last_round_also_if_one_of_its_arms_was_left_out() -> None:
+    last = RetrainedEgo(against="speedy", round=4)
+    met, settled = (Arm(ego=last, non_ego=PersonaNonEgo(persona="speedy", round=round_)) for round_ in (3, 5))
+    run = evidence({RETRAINED_VS: [0], met: [0]})
+    run = replace(run, arms=run.arms | {settled.name: settled})
+    assert judged_ego("last", "speedy", 1, run) == last
+
+
 RUN = evidence({RETRAINED_VS: hundred(0)})
 CLOSE = RUN.episodes.assign(near_miss=hundred(95), near_miss_ttc=hundred(90), near_miss_pet=0, near_miss_headway=0)
 CLOSE.loc[90:94, "near_miss_headway"] = 1
