@@ -15,7 +15,6 @@ from harness.environments.arena import Arena, Seat, Step
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray
 from harness.game.initial_state import StartDistribution, draw_initial_state
-from harness.game.observation import observe
 from harness.game.outcome import Outcome
 from harness.game.roles import EGO
 from harness.game.seeding import generator_of, parts_of
@@ -124,7 +123,7 @@ class SingleGame:
     def observation(self, player: int, step: Step | None = None) -> FloatArray:
         """The player's observation [SIZE]; in its last step, the one before it was removed or stopped."""
         if step is not None and any(self.ended(player)):
-            return observe(step.quantities)[0, player]
+            return step.observation[0, player].copy()
         return self.arena.observation[0, player].copy()
 
     def info(self, player: int, step: Step | None = None) -> Info:

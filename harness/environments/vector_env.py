@@ -73,7 +73,8 @@ class ArenaVecEnv(GamesVecEnv):
     Reward: [G] float32, the step's payoff to the learner's persona times `payoff_scale`.
 
     End: `done` [G] is true when the learner reaches its goal, touches a vehicle or a rail, or when the time limit is
-    up. The game is reset in the same step, and its last observation is `terminal_observation` in `infos`.
+    up. The game is reset in the same step, and its last observation, before the learner is removed or stopped, is
+    `terminal_observation` in `infos`.
 
     Each game is drawn from `parts`, the number of its tile, and the count of that tile's games.
 
@@ -113,7 +114,7 @@ class ArenaVecEnv(GamesVecEnv):
     def reset(self) -> FloatArray:
         """Reset every game. Returns observations [G, SIZE]."""
         self._games.reset(range(self.num_envs))
-        return self._observed()
+        return self._seen(self.arena.observation)
 
     def step_async(self, actions: FloatArray) -> None:
         """Store the learner's actions [G, 2] for `step_wait`. Raises ValueError for another shape."""
@@ -142,16 +143,16 @@ class ArenaVecEnv(GamesVecEnv):
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         ended = np.flatnonzero(done)
         if len(ended):
-            last = self._observed()
+            last = self._seen(step.observation)
             for game in ended:
                 infos[game] = {"terminal_observation": last[game]}
                 self._finish(int(game))
             self._games.reset(ended.tolist())
-        return self._observed(), payoff * self._payoff_scale, done, infos
+        return self._seen(self.arena.observation), payoff * self._payoff_scale, done, infos
 
-    def _observed(self) -> FloatArray:
-        """[G, D] what the learner sees, and with several seats which one it has."""
-        seen = self.arena.observation[:, self.learner].copy()
+    def _seen(self, observation: FloatArray) -> FloatArray:
+        """[G, D] what the learner sees, by the observations of all players, and with several seats which one it has."""
+        seen = observation[:, self.learner].copy()
         if self._seats == 1:
             return seen
         which = np.eye(self._seats, dtype=np.float32)[self.arena.member[:, self.learner]]
