@@ -64,7 +64,7 @@ class State:
     friction: FloatArray  # [G] coefficient of friction of the road
     visibility_m: FloatArray  # [G] distance up to which bodies are seen
     limit_share: FloatArray  # [G] factor on the speed limits
-    signals: IntArray  # [G, L] int8, states of signal links (`right_of_way.Signal`)
+    signals: IntArray  # [G, L] int8, states of signal links (`junctions.Signal`)
     signal_s: FloatArray  # [G, L] seconds since they changed
 
     @classmethod
