@@ -97,11 +97,12 @@ def world_of(
         for player, each in zip(players, document.players, strict=True)
     ]
     rules = right_of_way(net, lanes)
+    radius_m = max(0.5 * float(np.hypot(each.length_m, each.width_m)) for each in types)
     return World(
         road=Road(
-            rails(rail_lines),
+            rails(rail_lines, radius_m),
             Routes.of(routes),
-            None if ground is None else rails(ground.rail_lines),
+            None if ground is None else rails(ground.rail_lines, radius_m),
             None if ground is None else ground.raster,
         ),
         actuators=actuator_limits(document, types),
