@@ -20,7 +20,7 @@ from harness.maps.game_plans import GamePlan, Plans
 from harness.maps.import_map import import_map
 from harness.maps.map_traffic import read_traffic
 from harness.road.demand.route_file import RouteFile
-from harness.road.net.net_listing import ListedJunction, ListedLane, edges_near, listed
+from harness.road.net.net_listing import edges_within
 from harness.road.net.network import car_lanes, junctions_near, lane_line, nodes_of
 from harness.road.net.tiles import Tile, write_tiles
 from harness.road.xml.xml_file import number_of, parse_xml
@@ -52,7 +52,7 @@ class OpenMap:
 
     def near(self, edge: str | None, within_m: float) -> list[GamePlan]:
         """The plans at junctions near an edge; None: all. Raises UsageError if there is no such edge."""
-        edges = edges_near(self.net, self.source, edge, within_m)
+        edges = edges_within(self.net, self.source, edge, within_m)
         junctions = {node.getID() for node in nodes_of(edges)}
         return [plan for plan in self.plans if plan.candidate.junction in junctions]
 
@@ -67,9 +67,6 @@ class OpenMap:
 
     def roads(self) -> list[FloatArray]:
         return [lane_line(lane) for edge in self.net.getEdges(withInternal=False) for lane in car_lanes(edge)]
-
-    def listed(self) -> tuple[list[ListedLane], list[ListedJunction]]:
-        return listed(self.net.getEdges(withInternal=False))
 
 
 def open_map(
