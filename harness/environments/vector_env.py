@@ -64,9 +64,8 @@ class GamesVecEnv(LiveSimulation, VecEnv):
 class ArenaVecEnv(GamesVecEnv):
     """G games of one learner, as Stable-Baselines3's `VecEnv`. A game ends when the learner's part in it ends.
 
-    Observation: Box(-1, 1, (98,), float32) per game, [G, 98]; entries as in
-    `harness.environments.gymnasium_env.DrivingEnv`. A learner with several seats has one entry more for each: 1 for
-    the one that it has in this game, else 0.
+    Observation: Box(-1, 1, (98,), float32) per game, [G, 98]; entries as in docs/observation.md.
+    A learner with several seats has one entry more for each: 1 for the one that it has in this game, else 0.
 
     Action: Box(-1, 1, (2,), float32) per game, [G, 2]: pedals and wheel.
 

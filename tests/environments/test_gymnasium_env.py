@@ -112,16 +112,6 @@ def test_import__every_exported_name_exists() -> None:
         harness.DrivingEmv  # noqa: B018
 
 
-def test_docstring__names_every_entry_of_the_observation() -> None:
-    text = DrivingEnv.__doc__ or ""
-    for name in LAYOUT:
-        assert name.split("@")[0].split("_", name.startswith("other"))[-1] in text
-    assert f"({len(LAYOUT)},)" in text
-    first = {name.split("@")[0].split("_")[0]: k for k, name in reversed(list(enumerate(LAYOUT)))}
-    for word in ("other0", "other1"):
-        assert f"| {first[word]}-" in text
-
-
 def test_seed__gives_the_same_games_in_this_process_and_another(opened: Open, busy: OpenScene) -> None:
     environments = [opened(DrivingEnv, busy, other="sumo") for _ in range(2)]
     kinds = [type(each._game.arena.simulation) for each in environments]
