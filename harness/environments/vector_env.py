@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
@@ -16,13 +16,20 @@ from harness.drivers.policy_file import ACTIONS
 from harness.environments.arena import Arena
 from harness.environments.auto_reset import AutoReset, Replays
 from harness.environments.live_simulation import LiveSimulation
+from harness.environments.seats import Seat, taken_over, with_walkers
 from harness.environments.single_game import space_of
 from harness.game.arrays import FloatArray
 from harness.game.initial_state import StartDistribution
 from harness.game.observation_layout import SIZE
 from harness.game.outcome import Outcome
+from harness.road.scene.open_scene import OpenScene
+from harness.sumo.scene_games import SceneGames
+from harness.sumo.subprocess_simulation import open_simulations
 
 OBSERVATION_SPACE, ACTION_SPACE = space_of(SIZE), space_of(ACTIONS)
+
+Seats: TypeAlias = Sequence[Sequence[Seat]]
+"""[P][n] the seats of the players of a scene."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -218,3 +225,23 @@ class JoinedVecEnv(GamesVecEnv):
     def close(self) -> None:
         for each in self.environments:
             each.close()
+
+
+def open_arenas(parts: Sequence[tuple[OpenScene, int, Seats]], *, seed: int) -> list[Arena]:
+    """An arena for each part: its scene, its number of games, and the seats of their players. They share one SUMO where
+    they can: all of them make the first half of a step (`Arena.place`) before one of them goes on.
+
+    Raises SimulationError if SUMO can't load a scene.
+    """
+    seated = [(scene, games, with_walkers(seats, scene.world)) for scene, games, seats in parts]
+    played = [SceneGames(scene=scene, games=games, taken_over=taken_over(seats)) for scene, games, seats in seated]
+    simulations = open_simulations(played, seed=seed)
+    try:
+        return [
+            Arena(scene, games, seats, simulation=simulation)
+            for (scene, games, seats), simulation in zip(seated, simulations, strict=True)
+        ]
+    except BaseException:
+        for each in simulations:
+            each.close()
+        raise
