@@ -51,7 +51,7 @@ def test_merge__opens(merge: OpenScene) -> None:
     assert world.actuators.friction == 0.8
     assert merge.edges == (("approach", "exit"), ("approach", "exit"))
     assert merge.vehicle(1).vehicle_type == "person_car"
-    assert merge.departures(np.random.default_rng(0)) == []  # there is no background traffic
+    assert merge.departures(0) == []  # there is no background traffic
 
 
 def test_rails__are_found_as_far_as_a_long_player_reaches(tmp_path: Path) -> None:
@@ -69,7 +69,7 @@ def test_rails__are_found_as_far_as_a_long_player_reaches(tmp_path: Path) -> Non
 def test_scene__departures_are_those_of_the_background_traffic(folder: Path) -> None:
     flow = '<flow id="more" type="person_car" route="through" begin="1" period="10" departLane="1"/>'
     change(folder, "merge.rou.xml", "</routes>", f"{flow}</routes>")
-    departures = open_scene(folder).departures(np.random.default_rng(0))
+    departures = open_scene(folder).departures(0)
     assert [(each.name, each.depart_s) for each in departures] == [("more.0", 1.0), ("more.1", 11.0), ("more.2", 21.0)]
 
 
