@@ -124,15 +124,11 @@ class OpenScene:
         varies = self.document.varies
         factors_of = [[each] if isinstance(each, HumanFactors) else list(each) for each in human_factors]
         return StartDistribution(
+            world=self.world,
             places=self.places,
-            length_m=self.world.length_m,
-            max_speed_mps=self.world.actuators.max_speed_mps,
             human_factors=of_people(factors_of),
             shares=shares or [[1.0] * len(each) for each in factors_of],
             present_share=present_share,
-            steps=self.world.steps,
-            step_s=self.world.step_s,
-            routes=self.world.road.routes,
             friction=varies.friction or (self.document.friction, self.document.friction),
             visibility_m=varies.visibility_m or (self.document.visibility_m, self.document.visibility_m),
             limit_share=varies.speed_limit_share or (1.0, 1.0),
