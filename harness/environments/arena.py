@@ -164,7 +164,7 @@ class Arena(LiveSimulation):
         world = self.world
         requested = Requested(acceleration, steering, drove & self._on_wheels)
         move(state, requested, world.actuators, world.step_s)
-        if world.on_foot:
+        if world.walks.any():
             walk(state, requested._replace(moving=drove & world.walks), world.actuators, world.step_s)
         sliding = self._sliding(drove)
         if sliding.any():

@@ -90,7 +90,6 @@ def world_of(
 ) -> World:
     """The world of a scene's games; `rail_lines` are those of the roads."""
     document, net = files.document, files.net
-    walking = tuple(player.on_foot for player in document.players)
     routes, types = [player.route for player in players], [player.vehicle_type for player in players]
     lanes = [
         LaneRoute([]) if each.on_foot else lane_route(net, each, [net.getEdge(name) for name in player.edges])
@@ -111,6 +110,6 @@ def world_of(
         step_s=document.step_length_s,
         time_limit_s=document.time_limit_s,
         right_of_way=rules if ground is None else with_walkers_conflicts(rules, net, routes, ground.ways),
-        on_foot=walking if any(walking) else (),
+        walks=np.array([player.on_foot for player in document.players]),
         hiding=hiding_in(obstacles, files.routes, document),
     )
