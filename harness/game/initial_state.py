@@ -28,7 +28,7 @@ from harness.game.human_factors import (
 from harness.game.lapses import Lapses, draw_lapses
 from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles
 from harness.game.roles import EGO
-from harness.game.seeding import between, generator_of, parts_of, seed_of
+from harness.game.seeding import between, drawn_index, generator_of, parts_of, seed_of
 from harness.game.start_range import StartRange, draw_along_route, poses_of, starts_in
 from harness.game.world import World
 
@@ -198,8 +198,7 @@ def _varied(bounds: tuple[float, float], name: str, *parts: str | int) -> float:
 
 def draw_member(shares: Sequence[float], player: int, *parts: str | int) -> int:
     """Draw the index of a player's driver by their shares, from a separate generator: other draws do not change."""
-    upper = np.cumsum(shares)
-    return int(np.searchsorted(upper, generator_of(*parts, "member", player).random() * upper[-1], side="right"))
+    return drawn_index(shares, generator_of(*parts, "member", player))
 
 
 def member_in_episode(shares: Sequence[float], player: int, seed: int, episode: int) -> int:
