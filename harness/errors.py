@@ -20,6 +20,8 @@ from typing import TypeVar
 T = TypeVar("T")
 FAILED, USAGE_ERROR, NOT_ACCEPTED = 1, 2, 3
 """Exit codes: games, stages or checks failed; a mistake of the user; a bound of [acceptance] is not kept."""
+MOST_PROBLEMS = 20
+"""Of one kind, in one answer."""
 _LONGEST = 2_000  # characters of each part of a problem
 
 

@@ -39,7 +39,6 @@ from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
 from harness.environments.seats import taken_over
 from harness.game.arrays import FloatArray, IntArray
-from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.observation import observe
 from harness.game.outcome import Outcome
@@ -217,9 +216,7 @@ class ConflictReplay:
 
     def _start(self, game: int, replay: CourseReplay, driver: int) -> InitialState:
         """The state in which a replay begins; its road is as slippery as in the recorded game."""
-        present = [1.0] * len(self._scene.world.roles)
-        distribution = self._scene.start_distribution([HumanFactors()] * len(present), present)
-        drawn = draw_initial_state(distribution, *parts_of(self._seed, self._collisions[game].episode))
+        drawn = draw_initial_state(self._scene.usual_starts, *parts_of(self._seed, self._collisions[game].episode))
         return replace(start_of(replay, drawn), member=(driver, *drawn.member[1:]))
 
 

@@ -31,11 +31,9 @@ from harness.environments.arena import Arena, Seat
 from harness.errors import SimulationError, UsageError
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.cartesian_view import CartesianView
-from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import draw_initial_state
 from harness.game.outcome import Outcome
 from harness.game.roles import EGO
-from harness.game.seeding import generator_of
 from harness.road.scene.open_scene import OpenScene, open_scene
 
 _CHECKOUT = Path(__file__).resolve().parents[2]
@@ -218,20 +216,19 @@ def difference_of(driver: Driver, scene: OpenScene) -> str:
 
 
 def _play(driver: Driver, scene: OpenScene, games: int, *, findings: Findings, activity: str) -> list[_PlayedGame]:
-    players = len(scene.world.roles)
-    start_distribution = scene.start_distribution([HumanFactors()] * players, [1.0] * players)
+    people = len(scene.world.roles) - 1
     checked, played, outcomes = _with_checks(driver, findings.seconds), list[_PlayedGame](), list[str]()
     findings.game_seconds = []
-    arena = Arena(scene, 1, [Seat(checked), *[Seat(SumoDriver())] * (players - 1)])
+    arena = Arena(scene, 1, [Seat(checked), *[Seat(SumoDriver())] * people])
     try:
         for game in range(games):
             parts = ("check-driver", game)
-            start = draw_initial_state(start_distribution, *parts)
+            start = draw_initial_state(scene.usual_starts, *parts)
             checked.decisions, began = [], time.perf_counter()
             motion: list[FloatArray] = []
             try:
                 arena.reload(start.seed)
-                arena.reset({0: start}, {0: scene.departures(generator_of(*parts, "others"))})
+                arena.reset({0: start}, {0: scene.departures(*parts)})
                 while arena.state.running[0, EGO]:
                     state = arena.step().quantities.state
                     pose = (state.x_m, state.y_m, state.heading_rad, state.speed_mps)

@@ -31,7 +31,7 @@ from harness.evaluation.measured_game import measured
 from harness.evaluation.recorded_game import RecordedGame
 from harness.game.initial_state import InitialState, StartDistribution, draw_initial_state
 from harness.game.outcome import Outcome
-from harness.game.seeding import generator_of, parts_of
+from harness.game.seeding import parts_of
 from harness.road.demand.route_file import Departure
 from harness.road.scene.open_scene import OpenScene
 
@@ -195,7 +195,7 @@ class _Rollout:
         return replace(start, member=tuple(map(sum, zip(first, start.member, strict=True))))
 
     def _departures(self, episode: int) -> list[Departure]:
-        return self._joined.scene.departures(generator_of(*parts_of(self._joined.seed, episode), "others"))
+        return self._joined.scene.departures(*parts_of(self._joined.seed, episode))
 
     def _open_alone(self) -> Arena:
         if self._alone is None:

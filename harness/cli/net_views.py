@@ -13,20 +13,22 @@ from harness.maps.candidates import Candidate, CandidateKind, LaneWay, Priority
 from harness.maps.game_plans import GamePlan
 from harness.reports.net_page import Drawing, DrawnShape
 from harness.reports.text_table import add_text_row, text_table
-from harness.road.net.net_listing import ListedJunction, ListedLane
+from harness.road.net.net_listing import NetEdge, NetLane, junction_outline, lane_outline, permissions, signalled_ends
+from harness.road.net.network import nodes_of
 from harness.road.scene.open_scene import OpenScene
 
 _STARTS = 60  # drawn for each player
 
 
-def lane_table(lanes: Sequence[ListedLane]) -> Table:
+def lane_table(lanes: Sequence[NetLane]) -> Table:
     """A row for each lane."""
     numbers = ("length m", "limit m/s", "width m")
     table = text_table(("lane", *numbers, "for", "from", "to", "leads to"), right=numbers, header_style="bold")
     for lane in lanes:
-        size = (f"{lane.length_m:.1f}", f"{lane.limit_mps:.2f}", f"{lane.width_m:.1f}")
-        ends = (lane.start_junction, lane.end_junction, lane.leads_to)
-        add_text_row(table, lane.name, *size, lane.permissions, *ends)
+        size = (f"{lane.getLength():.1f}", f"{lane.getSpeed():.2f}", f"{lane.getWidth():.1f}")
+        # SUMO's letter of the direction, and the edge: `l north_out` is to the left
+        leads_to = [f"{link.getDirection()} {link.getTo().getID()}" for link in lane.getOutgoing()]
+        add_text_row(table, lane.getID(), *size, permissions(lane), *_ends(lane), leads_to)
     return table
 
 
@@ -65,6 +67,12 @@ def conflict_words(conflict: Candidate) -> str:
     return f"{_way(conflict.first)} {verb} {_way(conflict.second)}; priority: {_priority(conflict)}"
 
 
+def _ends(lane: NetLane) -> tuple[str, str]:
+    """The junctions from which and to which a lane leads."""
+    edge = lane.getEdge()
+    return edge.getFromNode().getID(), edge.getToNode().getID()
+
+
 def _way(way: LaneWay | None) -> str:
     return "" if way is None else f"{way.start.getID()} to {way.end.getID()}"
 
@@ -76,27 +84,28 @@ def _priority(conflict: Candidate, first: str = "the first") -> str:
 
 def drawing_of(
     title: str,
-    lanes: Sequence[ListedLane],
-    junctions: Sequence[ListedJunction],
+    edges: Sequence[NetEdge],
     conflicts: Iterable[tuple[int, FloatArray, str]],
     scene: OpenScene | None = None,
 ) -> Drawing:
-    """The drawing of lanes, junctions, and conflicts with their number, place [2] (m) and text; for a scene also its
-    routes and goals, and seeded starts."""
+    """The drawing of edges, their junctions, and conflicts with their number, place [2] (m) and text; for a scene also
+    its routes and goals, and seeded starts."""
+    lanes, junctions, listed = [lane for edge in edges for lane in edge.getLanes()], nodes_of(edges), set(edges)
     shapes = [
-        DrawnShape(points=each.outline, kind="junction", text=f"junction {each.name} ({each.kind})")
-        for each in junctions
-        if len(each.outline) > 2
+        DrawnShape(points=outline, kind="junction", text=f"junction {node.getID()} ({node.getType()})")
+        for node in junctions
+        if len(outline := junction_outline(node)) > 2
     ]
     for lane in lanes:
-        text = f"{lane.name}: {lane.length_m:.1f} m, {lane.limit_mps:.2f} m/s, {lane.permissions}; "
-        text += f"from {lane.start_junction} to {lane.end_junction}"
-        kind = "lane" if lane.for_cars else "lane other"
-        shapes.append(DrawnShape(points=lane.outline, kind=kind, text=text, label=lane.name))
+        name, (start, end) = lane.getID(), _ends(lane)
+        text = f"{name}: {lane.getLength():.1f} m, {lane.getSpeed():.2f} m/s, {permissions(lane)}; "
+        text += f"from {start} to {end}"
+        kind = "lane" if lane.allows("passenger") else "lane other"
+        shapes.append(DrawnShape(points=lane_outline(lane), kind=kind, text=text, label=name))
     signals = [
-        DrawnShape(points=point[None], kind="signal", text=f"signal of junction {junction.name}")
-        for junction in junctions
-        for point in junction.signals
+        DrawnShape(points=point[None], kind="signal", text=f"signal of junction {node.getID()}")
+        for node in junctions
+        for point in signalled_ends(node, listed)
     ]
     numbers = [
         DrawnShape(points=place[None], kind="conflict", text=f"conflict {number}: {text}", label=str(number))

@@ -55,8 +55,8 @@ def show_scene(
     from harness.cli.net_views import conflict_table, conflict_words, lane_table
     from harness.maps.candidates import listed_conflicts
     from harness.road.net.net_file import check_net
-    from harness.road.net.net_listing import edges_near, listed
-    from harness.road.net.network import read_net
+    from harness.road.net.net_listing import edges_within
+    from harness.road.net.network import nodes_of, read_net
     from harness.road.scene.open_scene import open_scene
 
     path = document_at(path, "networks")
@@ -65,8 +65,9 @@ def show_scene(
     net_file = scene.net_file if scene is not None else path
     warnings = scene.warnings if scene is not None else check_net(net_file).warnings
     net = read_net(net_file)
-    lanes, junctions = listed(edges_near(net, net_file, near, within))
-    conflicts = listed_conflicts(net, [junction.name for junction in junctions])
+    edges = edges_within(net, net_file, near, within)
+    lanes = [lane for edge in edges for lane in edge.getLanes()]
+    conflicts = listed_conflicts(net, [node.getID() for node in nodes_of(edges)])
     console = console_of_any_encoding()
     console.print(lane_table(lanes[:rows]), markup=False, highlight=False)
     if conflicts:
@@ -82,7 +83,7 @@ def show_scene(
 
         title = scene.document.name if scene is not None else path.name
         places = ((k, each.place, conflict_words(each)) for k, each in enumerate(conflicts, start=1))
-        write_net_page(drawing_of(title, lanes, junctions, places, scene), html)
+        write_net_page(drawing_of(title, edges, places, scene), html)
         print_plain([f"Page: {html}"], console)
 
 
@@ -267,7 +268,7 @@ def _write_page(opened: OpenMap, plans: Sequence[GamePlan], file: Path) -> None:
     for plan in plans:
         text = f"{plan.candidate.kind.value}, {opened.place_of(plan)}; priority: {plan_priority(plan)}"
         places.append((plan.number, plan.candidate.place, text))
-    write_net_page(drawing_of(opened.source.name, *opened.listed(), places), file)
+    write_net_page(drawing_of(opened.source.name, opened.net.getEdges(withInternal=False), places), file)
 
 
 def _write(opened: OpenMap, chosen: Mapping[str, Sequence[GamePlan]], out: Path, console: Console) -> None:

@@ -172,6 +172,9 @@ class Scene(Document):
         for role, player in zip(self.roles, self.players, strict=True):
             if player.beside_ego_m is not None and self.ego.position_m is None:
                 raise ValueError(f"{role}.beside_ego_m needs ego.position_m, along the ego's lane")
+            if player.arrival_after_ego_s is not None and self.ego.speed_mps[0] <= 0.0:
+                message = f"{role} arrives so long after an ego of this speed (arrival_after_ego_s), and it may stand"
+                raise Mistakes([("ego.speed_mps", message, f"give speeds above 0, or give {role} route_m instead")])
             if self.goal is None and player.goal is None and not player.on_foot:
                 raise ValueError(f"{role} has no goal: give [goal] for all players, or give {role} a goal")
         if self.goal is not None and all(player.goal is not None or player.on_foot for player in self.players):

@@ -38,7 +38,7 @@ class Car:
         return {name: float(np.asarray(value).reshape(-1)[0]) for name, value in values.items()}
 
     def physical(self, observation: FloatArray) -> FloatArray:
-        """[N, SIZE] observation in the units that the names in `harness.game.observation.LAYOUT` end with."""
+        """[N, SIZE] observation in the units that the names in `harness.game.observation_layout.LAYOUT` end with."""
         return in_units(observation, float(self.actuators.max_steering_rad[0]))
 
     def actions(self, acceleration_mps2: FloatArray, steering_rad: FloatArray, observation: FloatArray) -> FloatArray:

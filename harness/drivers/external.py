@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -71,11 +71,11 @@ class ExternalDriver:
     """The folder of a policy, or the folder that paths in the document are relative to."""
     document: DriverDocument | None
     """None: a policy's folder."""
-    command: tuple[str, ...]
+    command: tuple[str, ...] = ()
     """Of a program: its path and arguments. Empty for other kinds."""
-    files: Mapping[str, str]
+    files: Mapping[str, str] = field(default_factory=dict)
     """SHA-256 of each file that the driver depends on, by path."""
-    package: Mapping[str, str]
+    package: Mapping[str, str] = field(default_factory=dict)
     """Of an installed driver: package, version, entry point, and a hash of the code."""
 
     @property
@@ -196,7 +196,7 @@ def find_driver(written: str, file: Path, key: str, allow_code: bool) -> Externa
         place = find_document(written, file.parent, "policies")
     if os.path.isdir(place):
         read_policy(place)
-        return _external(written, place, None, files=policy_files(place))
+        return ExternalDriver(written=written, place=place, document=None, files=_hashed(policy_files(place)))
     if place.suffix.lower() != ".toml":
         kind = _KIND_OF_SUFFIX.get(place.suffix.lower(), "stable_baselines3")
         remedy = f'; or name a TOML document with kind = "{kind}", file = "{place.name}"'
@@ -218,7 +218,8 @@ def find_driver(written: str, file: Path, key: str, allow_code: bool) -> Externa
         remedy += f"; {_shipped_policies_as(written)}"
         raise UsageError.of(file, key, f"there is no driver {written!r}", remedy)
     package = version_of(entry_point(written, file, key))
-    return _external(written, place.parent, Python(kind="python", entry_point=written), package=package)
+    document = Python(kind="python", entry_point=written)
+    return ExternalDriver(written=written, place=place.parent, document=document, package=package)
 
 
 def _shipped_policies_as(written: str) -> str:
@@ -245,26 +246,14 @@ def _from_document(written: str, place: Path, document: DriverDocument) -> Exter
         command = (str(find_program(program, runs_in, place)), *arguments)
         named = [resolve_in(runs_in, each) for each in arguments if is_file(runs_in, each)]
         files = [Path(command[0]), *named, *files]
-    package = None
+    package: Mapping[str, str] = {}
     if isinstance(document, Python):
         package = version_of(entry_point(document.entry_point, place, "entry_point"))
-    return _external(written, folder, document, files=files, command=command, package=package)
-
-
-def _external(
-    written: str,
-    place: Path,
-    document: DriverDocument | None,
-    *,
-    files: Iterable[Path] = (),
-    package: Mapping[str, str] | None = None,
-    command: tuple[str, ...] = (),
-) -> ExternalDriver:
     return ExternalDriver(
-        written=written,
-        place=place,
-        document=document,
-        command=command,
-        files={str(file): sha256_of(file) for file in files},
-        package=package or {},
+        written=written, place=folder, document=document, command=command, files=_hashed(files), package=package
     )
+
+
+def _hashed(files: Iterable[Path]) -> dict[str, str]:
+    """SHA-256 of each file, by path."""
+    return {str(file): sha256_of(file) for file in files}

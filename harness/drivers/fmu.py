@@ -4,7 +4,7 @@ An FMU is native code. If it crashes or hangs, one game fails and the campaign c
 
 | variables of the FMU | connected to |
 | --- | --- |
-| inputs | entries of the observation, in the units that their names in `harness.game.observation.LAYOUT` end with |
+| inputs | entries of the observation, in the units of their names in `harness.game.observation_layout.LAYOUT` |
 | outputs | acceleration_mps2 (m/s2) and steering_rad (road wheel angle, left positive) |
 """
 

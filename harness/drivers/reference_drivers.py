@@ -7,13 +7,12 @@ user ahead. Where ways cross, a driver who brakes less may pass before the other
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from harness.config.rule_driver import CarefulAndCompetent, Cruise, FuzzySafety, Rss, Rules
 from harness.drivers.car import Car
-from harness.drivers.protocol import Driver
 from harness.drivers.rules_driver import RulesDriver
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.roles import EGO
@@ -27,14 +26,6 @@ REFERENCES = (*PERSONS, UPPER_BOUND)
 
 _DESCRIPTION = "A reference driver, which judges whether a failure could have been prevented."
 _USUAL_LANE_M = (2.0, 5.0)
-
-
-class ReferenceDriver(Driver, Protocol):
-    """A driver with a rule that says danger."""
-
-    def sees_danger(self, observation: FloatArray) -> BoolArray:
-        """[N] whether the rule says danger for observations [N, SIZE], with no reaction under way."""
-        ...
 
 
 def reference_driver(name: str, car: Car, lane_width_m: float) -> ReferenceDriver:
@@ -93,6 +84,10 @@ class StrongestBraking:
         actions = self._cruising.decide(games, observation, noise)
         actions[self.sees_danger(observation), 0] = -1.0
         return actions
+
+
+ReferenceDriver: TypeAlias = RulesDriver | StrongestBraking
+"""A driver with a rule that says danger."""
 
 
 class FullBraking(StrongestBraking):

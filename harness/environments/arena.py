@@ -52,6 +52,8 @@ class Step:
     """Whether the player was still driving when the step began."""
     quantities: Quantities
     """At the end of the step, before a player is removed."""
+    observation: FloatArray
+    """[G, P, SIZE] what the players observe then."""
 
 
 class _Placed(NamedTuple):
@@ -162,7 +164,7 @@ class Arena(LiveSimulation):
         world = self.world
         requested = Requested(acceleration, steering, drove & self._on_wheels)
         move(state, requested, world.actuators, world.step_s)
-        if world.on_foot:
+        if world.walks.any():
             walk(state, requested._replace(moving=drove & world.walks), world.actuators, world.step_s)
         sliding = self._sliding(drove)
         if sliding.any():
@@ -189,9 +191,9 @@ class Arena(LiveSimulation):
         terminations(state.outcome, drove, (self._taken_over, state.step >= world.steps), distances_m)
         payoff = self._payoffs(quantities, drove)
         check_step(before, quantities, drove=drove, payoff=payoff, taken_over=self._taken_over)
-        self._finish(quantities, drove, sliding)
+        observation = self._finish(quantities, drove, sliding)
         check_observation(self.observation, self._all_games, state.step)
-        return Step(payoff=payoff, drove=drove, quantities=quantities)
+        return Step(payoff=payoff, drove=drove, quantities=quantities, observation=observation)
 
     def close(self) -> None:
         """Close the SUMO simulation."""
@@ -240,14 +242,14 @@ class Arena(LiveSimulation):
         crashed = (self.state.outcome == _COLLISION) | (self.state.outcome == _RAIL)
         return crashed & ~drove & self._on_wheels & self.state.present & (self.state.speed_mps > 0.0)
 
-    def _finish(self, quantities: Quantities, drove: BoolArray, sliding: BoolArray) -> None:
-        """Remove players that reached their goal, let those that crashed slide, and observe."""
+    def _finish(self, quantities: Quantities, drove: BoolArray, sliding: BoolArray) -> FloatArray:
+        """Remove players that reached their goal, let those that crashed slide, and observe. Returns the observations
+        before that."""
         outcome = self.state.outcome
         ended = drove & (outcome != _RUNNING)
         changed = np.flatnonzero((ended | sliding).any(1))
         if not len(changed):
-            self._remember_and_observe(quantities, changed)
-            return
+            return self._remember_and_observe(quantities, changed)
         for (game, player), reached in zip(np.argwhere(ended).tolist(), outcome[ended].tolist(), strict=True):
             if reached == _GOAL:
                 self.simulation.remove(game, player)
@@ -263,16 +265,17 @@ class Arena(LiveSimulation):
         state.speed_mps[ended & ~slides] = 0.0
         state.acceleration_mps2[ended] = 0.0
         state.lapsed[ended] = False
-        self._remember_and_observe(quantities, changed)
+        return self._remember_and_observe(quantities, changed)
 
-    def _remember_and_observe(self, quantities: Quantities, changed: IntArray) -> None:
+    def _remember_and_observe(self, quantities: Quantities, changed: IntArray) -> FloatArray:
         """Observe what the players know, and keep the steering that follows the road for the next decisions.
 
         `quantities` are those before players were removed, stopped or turned along a rail in the games `changed` [N].
+        Returns the observations of that time.
         """
         self.knowledge.remember(self.state)
         self._road_steering_rad = quantities.along.road_steering_rad
-        self.observation = self._observed(quantities, self._all_games, advance=True)
+        observed = self.observation = self._observed(quantities, self._all_games, advance=True)
         if len(changed):
             # Positions are unchanged: only speeds are, and which players are present.
             state = self.state.of(changed)
@@ -280,9 +283,11 @@ class Arena(LiveSimulation):
             of_games = {name: getattr(quantities, name)[changed] for name in columns}
             bodies = self.nearby.of(state, self.reading, changed)
             after = Quantities(world=self.world, state=state, bodies=bodies, **of_games)
+            self.observation = observed.copy()
             self.observation[changed] = self._observed(after, changed)
             self._road_steering_rad = self._road_steering_rad.copy()
             self._road_steering_rad[changed] = after.along.road_steering_rad
+        return observed
 
     def _observed(self, quantities: Quantities, games: IntArray, *, advance: bool = False) -> FloatArray:
         return self.knowledge.observations(quantities, self.state.step, self.reading, games, advance=advance)

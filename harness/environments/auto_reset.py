@@ -7,7 +7,6 @@ from typing import Protocol
 
 from harness.environments.arena import Arena
 from harness.game.initial_state import InitialState, StartDistribution, draw_initial_state
-from harness.game.seeding import generator_of
 from harness.road.demand.route_file import Departure
 
 
@@ -57,7 +56,7 @@ class AutoReset:
     def _next(self, tile: int) -> tuple[InitialState, list[Departure]]:
         drawn = self._take(tile)
         replayed = self._replays.replay(tile, drawn[0]) if self._replays is not None else None
-        return drawn if replayed is None else (replayed, self._departures(*replayed.parts))
+        return drawn if replayed is None else (replayed, self._arena.scene.departures(*replayed.parts))
 
     def _take(self, tile: int) -> tuple[InitialState, list[Departure]]:
         if tile not in self._store:
@@ -68,9 +67,4 @@ class AutoReset:
     def _draw(self, tile: int) -> tuple[InitialState, list[Departure]]:
         parts = (*self._parts, tile, self._drawn[tile])
         self._drawn[tile] += 1
-        departures = self._departures(*parts)
-        return draw_initial_state(self._start_distribution, *parts), departures
-
-    def _departures(self, *parts: str | int) -> list[Departure]:
-        scene = self._arena.scene
-        return scene.departures(generator_of(*parts, "others")) if scene.has_background_traffic else []
+        return draw_initial_state(self._start_distribution, *parts), self._arena.scene.departures(*parts)

@@ -19,8 +19,8 @@ from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.cartesian_view import SIGNAL_STATES, CartesianView, SeenObject, SeenSignal
 from harness.game.field_of_view import Seen
 from harness.game.memory import Perceived
+from harness.game.observation import seen_bodies
 from harness.game.quantities import Quantities
-from harness.game.seen_bodies import seen_bodies
 from harness.game.state import Bodies, State
 from harness.road.scene.cartesian_road import signal_lines
 from harness.road.scene.open_scene import OpenScene

@@ -30,31 +30,8 @@ _PICTURES_PER_S = 10  # the steps of the shipped scenes; an environment has thos
 class DrivingEnv(LiveSimulation, gymnasium.Env[Any, Any]):
     """One player's game on a scene with SUMO traffic. Also `gymnasium.make("harness:harness/Ego-v0")`, or `NonEgo-v0`.
 
-    Observation: Box(-1, 1, (98,), float32), in the player's frame; `harness.game.observation_layout` names its entries.
-    An entry x is divided by its scale and clipped to [-1, 1], or compressed:
-
-    | entries | quantity | scale |
-    | --- | --- | --- |
-    | 0, 1 | speed_mps, speed_limit_mps | 30 m/s |
-    | 2 | speed_over_limit, as a share of the limit | 1 |
-    | 3 | over_posted_mps, speed over what limits ahead, signals and signs permit | x/(|x| + 5 m/s) |
-    | 4 | acceleration_mps2 | 10 m/s2 |
-    | 5, 6 | steering_rad, road_steering_rad (the angle that follows the route) | the car's lock |
-    | 7, 8 | lane_end_m, goal_m, distance to the end of the player's lane and to the goal | 100 m, 200 m |
-    | 9-11 | own_side_left_m, own_side_right_m (marks to oncoming lanes), path_left_m (the route's line) | 8 m |
-    | 12-17 | path_turned_rad, the route's heading 0, 5, 10, 20, 30, 50 m ahead | x/(|x| + 0.5 rad) |
-    | 18-23 | path_bend_per_m, the tightest bend from there on to the next | x/(|x| + 0.1/m) |
-    | 24-29, 30-35 | free_left_m, free_right_m, to the nearest surface on that side (right negative), there | 8 m |
-    | 36 | stop_line_m, distance of the front bumper to the next stop line | x/(|x| + 20 m) |
-    | 37-41 | at that line: give_way, stop_sign, signal_green, signal_yellow, signal_red | 1 |
-    | 42 | signal_s, time since the signal changed | x/(|x| + 5 s) |
-    | 43-45 | leader_seen (0 or 1), leader_gap_m, leader_mps (relative), ahead | 1, x/(|x| + 20 m), + 10 m/s |
-    | 46-58 | other0, the most urgent road user: seen (0 or 1), ahead_m, left_m | 1, x/(|x| + 20 m), + 8 m |
-    |  | ahead_mps (relative), left_mps (absolute) | x/(|x| + 10 m/s), + 5 m/s |
-    |  | turned_sin, turned_cos (its heading), length_m, width_m | 1, 1, 20 m, 4 m |
-    |  | own_to_conflict_m, other_to_conflict_m, to the place where the two ways meet | x/(|x| + 20 m) |
-    |  | arrives_later_s than the player, has_priority (1, -1, 0 without a conflict) | x/(|x| + 3 s), 1 |
-    | 59-71, 72-84, 85-97 | other1 to other3, the next most urgent; zeros if there are fewer | as other0 |
+    Observation: Box(-1, 1, (98,), float32), in the player's frame. docs/observation.md has its entries,
+    `harness.game.observation_layout.LAYOUT` their order.
 
     Action: Box(-1, 1, (2,), float32): pedals (-1 full brake, 0 coast, 1 full throttle) and wheel (0 follows the route;
     -1 and 1 add the largest angle to the right and to the left; the largest useful angle depends on the speed).

@@ -18,7 +18,6 @@ from harness.environments.single_game import checked_actions, numbers_of
 from harness.environments.vector_env import ACTION_SPACE, OBSERVATION_SPACE, ArenaVecEnv
 from harness.errors import UsageError
 from harness.game.arrays import BoolArray, FloatArray
-from harness.game.observation import observe
 from harness.game.outcome import Outcome
 from harness.game.state import State
 from harness.road.scene.open_scene import OpenScene
@@ -105,7 +104,7 @@ class VectorDrivingEnv(LiveSimulation, gymnasium.vector.VectorEnv[Any, Any, Any]
         ended, truncated = outcome != Outcome.RUNNING, outcome == Outcome.TIMEOUT
         final: dict[str, Any] = {}
         if ended.any():
-            last, final_obs = observe(step.quantities)[:, self._learner], np.full(self.num_envs, None, dtype=object)
+            last, final_obs = step.observation[:, self._learner], np.full(self.num_envs, None, dtype=object)
             for game in np.flatnonzero(ended).tolist():
                 final_obs[game] = last[game].copy()
             final = {"final_obs": final_obs, "_final_obs": ended.copy()}

@@ -15,10 +15,9 @@ from harness.environments.arena import Arena, Seat, Step
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray
 from harness.game.initial_state import StartDistribution, draw_initial_state
-from harness.game.observation import observe
 from harness.game.outcome import Outcome
 from harness.game.roles import EGO
-from harness.game.seeding import generator_of, parts_of
+from harness.game.seeding import parts_of
 from harness.game.state import Bodies, State
 from harness.game.world import World
 from harness.road.scene.open_scene import OpenScene
@@ -67,7 +66,7 @@ class SingleGame:
         parts = _named_game(options) if options else ("environment", int(generator.integers(2**63 - 1)))
         start = draw_initial_state(self._start_distribution, *parts)
         self.arena.reload(start.seed)
-        self.arena.reset({0: start}, {0: self._scene.departures(generator_of(*parts, "others"))})
+        self.arena.reset({0: start}, {0: self._scene.departures(*parts)})
         self._bodies = self.arena.nearby.of(self.arena.state, self.arena.reading)
         self._show()
 
@@ -124,7 +123,7 @@ class SingleGame:
     def observation(self, player: int, step: Step | None = None) -> FloatArray:
         """The player's observation [SIZE]; in its last step, the one before it was removed or stopped."""
         if step is not None and any(self.ended(player)):
-            return observe(step.quantities)[0, player]
+            return step.observation[0, player].copy()
         return self.arena.observation[0, player].copy()
 
     def info(self, player: int, step: Step | None = None) -> Info:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
@@ -16,13 +16,20 @@ from harness.drivers.policy_file import ACTIONS
 from harness.environments.arena import Arena
 from harness.environments.auto_reset import AutoReset, Replays
 from harness.environments.live_simulation import LiveSimulation
+from harness.environments.seats import Seat, taken_over, with_walkers
 from harness.environments.single_game import space_of
 from harness.game.arrays import FloatArray
 from harness.game.initial_state import StartDistribution
 from harness.game.observation_layout import SIZE
 from harness.game.outcome import Outcome
+from harness.road.scene.open_scene import OpenScene
+from harness.sumo.scene_games import SceneGames
+from harness.sumo.subprocess_simulation import open_simulations
 
 OBSERVATION_SPACE, ACTION_SPACE = space_of(SIZE), space_of(ACTIONS)
+
+Seats: TypeAlias = Sequence[Sequence[Seat]]
+"""[P][n] the seats of the players of a scene."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,16 +71,16 @@ class GamesVecEnv(LiveSimulation, VecEnv):
 class ArenaVecEnv(GamesVecEnv):
     """G games of one learner, as Stable-Baselines3's `VecEnv`. A game ends when the learner's part in it ends.
 
-    Observation: Box(-1, 1, (98,), float32) per game, [G, 98]; entries as in
-    `harness.environments.gymnasium_env.DrivingEnv`. A learner with several seats has one entry more for each: 1 for
-    the one that it has in this game, else 0.
+    Observation: Box(-1, 1, (98,), float32) per game, [G, 98]; entries as in docs/observation.md.
+    A learner with several seats has one entry more for each: 1 for the one that it has in this game, else 0.
 
     Action: Box(-1, 1, (2,), float32) per game, [G, 2]: pedals and wheel.
 
     Reward: [G] float32, the step's payoff to the learner's persona times `payoff_scale`.
 
     End: `done` [G] is true when the learner reaches its goal, touches a vehicle or a rail, or when the time limit is
-    up. The game is reset in the same step, and its last observation is `terminal_observation` in `infos`.
+    up. The game is reset in the same step, and its last observation, before the learner is removed or stopped, is
+    `terminal_observation` in `infos`.
 
     Each game is drawn from `parts`, the number of its tile, and the count of that tile's games.
 
@@ -113,7 +120,7 @@ class ArenaVecEnv(GamesVecEnv):
     def reset(self) -> FloatArray:
         """Reset every game. Returns observations [G, SIZE]."""
         self._games.reset(range(self.num_envs))
-        return self._observed()
+        return self._seen(self.arena.observation)
 
     def step_async(self, actions: FloatArray) -> None:
         """Store the learner's actions [G, 2] for `step_wait`. Raises ValueError for another shape."""
@@ -142,16 +149,16 @@ class ArenaVecEnv(GamesVecEnv):
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         ended = np.flatnonzero(done)
         if len(ended):
-            last = self._observed()
+            last = self._seen(step.observation)
             for game in ended:
                 infos[game] = {"terminal_observation": last[game]}
                 self._finish(int(game))
             self._games.reset(ended.tolist())
-        return self._observed(), payoff * self._payoff_scale, done, infos
+        return self._seen(self.arena.observation), payoff * self._payoff_scale, done, infos
 
-    def _observed(self) -> FloatArray:
-        """[G, D] what the learner sees, and with several seats which one it has."""
-        seen = self.arena.observation[:, self.learner].copy()
+    def _seen(self, observation: FloatArray) -> FloatArray:
+        """[G, D] what the learner sees, by the observations of all players, and with several seats which one it has."""
+        seen = observation[:, self.learner].copy()
         if self._seats == 1:
             return seen
         which = np.eye(self._seats, dtype=np.float32)[self.arena.member[:, self.learner]]
@@ -218,3 +225,23 @@ class JoinedVecEnv(GamesVecEnv):
     def close(self) -> None:
         for each in self.environments:
             each.close()
+
+
+def open_arenas(parts: Sequence[tuple[OpenScene, int, Seats]], *, seed: int) -> list[Arena]:
+    """An arena for each part: its scene, its number of games, and the seats of their players. They share one SUMO where
+    they can: all of them make the first half of a step (`Arena.place`) before one of them goes on.
+
+    Raises SimulationError if SUMO can't load a scene.
+    """
+    seated = [(scene, games, with_walkers(seats, scene.world)) for scene, games, seats in parts]
+    played = [SceneGames(scene=scene, games=games, taken_over=taken_over(seats)) for scene, games, seats in seated]
+    simulations = open_simulations(played, seed=seed)
+    try:
+        return [
+            Arena(scene, games, seats, simulation=simulation)
+            for (scene, games, seats), simulation in zip(seated, simulations, strict=True)
+        ]
+    except BaseException:
+        for each in simulations:
+            each.close()
+        raise

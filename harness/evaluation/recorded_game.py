@@ -21,7 +21,7 @@ from harness.game.junctions import SIGNALS, Signal
 from harness.game.outcome import Outcome
 from harness.game.quantities import Quantities
 from harness.game.roles import EGO
-from harness.game.state import NEAREST, NOTICED_M, Bodies, PlayersMotion, State
+from harness.game.state import Bodies, PlayersMotion, State, nearest_to_players
 from harness.game.traffic_rules import since_change_s
 from harness.game.world import World
 
@@ -143,14 +143,15 @@ class RecordedGame:
     @cached_property
     def _considered(self) -> BoolArray:
         """[T, B]"""
-        bodies, players = self.bodies, len(self.world.roles)
+        players, result = len(self.world.roles), np.ones(self.bodies.present.shape, dtype=bool)
         others = slice(players, len(self.names) - len(self.obstacles))
-        dx, dy = (each[:, others, None] - each[:, None, :players] for each in (bodies.x_m, bodies.y_m))
-        both = bodies.present[:, others, None] & bodies.present[:, None, :players]
-        away = np.where(both, np.hypot(dx, dy), np.inf).min(-1)
-        rank = away.argsort(axis=1, kind="stable").argsort(axis=1)
-        result = np.ones(bodies.present.shape, dtype=bool)
-        result[:, others] = (away <= NOTICED_M) & (rank < NEAREST)
+        of_others, of_players = (
+            Bodies._make(np.ascontiguousarray(column[:, each]) for column in self.bodies)
+            for each in (others, slice(players))
+        )
+        nearest, considered = nearest_to_players(of_others, of_players)
+        result[:, others] = False
+        np.put_along_axis(result[:, others], nearest, considered, axis=1)
         return result
 
     @cached_property

@@ -27,10 +27,10 @@ from harness.game.human_factors import (
 )
 from harness.game.lapses import Lapses, draw_lapses
 from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles
-from harness.game.road import Routes
 from harness.game.roles import EGO
-from harness.game.seeding import between, generator_of, parts_of, seed_of
+from harness.game.seeding import between, drawn_index, generator_of, parts_of, seed_of
 from harness.game.start_range import StartRange, draw_along_route, poses_of, starts_in
+from harness.game.world import World
 
 _UNLIMITED = (Reaction(), Sight(), ActuatorShares())
 
@@ -91,24 +91,20 @@ class InitialState:
 
 @dataclass(frozen=True, kw_only=True)
 class StartDistribution:
-    """The distribution of initial states: start ranges, lengths, top speeds and probabilities of taking part, each [P].
+    """The distribution of initial states in a world: start ranges and probabilities of taking part, each [P].
 
     Players that do not take part in every game take part in the same games, as far as their probabilities are equal.
     A player may have several drivers. Each game draws one of them by the `shares`, with its human factors.
-    In `along_route_share` of the games, the players start anywhere along their `routes` instead, up to their goals.
+    In `along_route_share` of the games, the players start anywhere along their routes instead, up to their goals.
     With `meet_in_place` they do so only in games of a player alone. In `followed_share` of the games, somebody follows
     the ego.
     """
 
+    world: World
     places: Sequence[StartRange]
-    length_m: FloatArray
-    max_speed_mps: FloatArray
     human_factors: Sequence[Sequence[HumanFactors]]
     shares: Sequence[Sequence[float]]
     present_share: Sequence[float]
-    steps: int
-    step_s: float
-    routes: Routes
     friction: tuple[float, float]
     visibility_m: tuple[float, float] = (np.inf, np.inf)
     limit_share: tuple[float, float] = (1.0, 1.0)
@@ -128,7 +124,7 @@ def of_people(human_factors: Sequence[Sequence[HumanFactors]]) -> list[list[Huma
 
 def draw_initial_state(starts: StartDistribution, *parts: str | int) -> InitialState:
     """Draw the initial state of one game, with seeds hashed from the named parts."""
-    generator = generator_of(*parts, "start")
+    generator, world = generator_of(*parts, "start"), starts.world
     players = range(len(starts.places))
     drawn = generator.random(4 * len(players))  # the same numbers as drawn one by one
     draws = iter(drawn[2 * len(players) :].tolist())
@@ -140,20 +136,20 @@ def draw_initial_state(starts: StartDistribution, *parts: str | int) -> InitialS
     human_factors = [starts.human_factors[player][member[player]] for player in players]
     shoulder_glance = [glances_over_shoulder(each.sight, next(draws)) for each in human_factors]
     limits = [_limits(each, starts, player, *parts) for player, each in enumerate(human_factors)]
-    lapses = [Lapses.none(starts.steps)] * len(players)
+    lapses = [Lapses.none(world.steps)] * len(players)
     for player, each in enumerate(human_factors):
         if each.attention is not None:
             of_player = generator_of(*parts, "attention", player)
-            lapses[player] = draw_lapses(each.attention, starts.steps, starts.step_s, of_player)
-    x, y, heading = poses_of(starts.places, positions_m, starts.length_m)
+            lapses[player] = draw_lapses(each.attention, world.steps, world.step_s, of_player)
+    x, y, heading = poses_of(starts.places, positions_m, world.length_m)
     positions, speeds = np.array(positions_m), np.array(speeds_mps)
-    stations = positions - 0.5 * starts.length_m
+    stations = positions - 0.5 * world.length_m
     if starts.along_route_share and not (starts.meet_in_place and sum(present) > 1):
         along = draw_along_route(
-            starts.routes,
+            world.road.routes,
             generator_of(*parts, "along route"),
-            length_m=starts.length_m,
-            max_speed_mps=starts.max_speed_mps,
+            length_m=world.length_m,
+            max_speed_mps=world.actuators.max_speed_mps,
             present=np.array(present),
             share=starts.along_route_share,
             obstacles=starts.obstacles.boxes(*parts),
@@ -169,7 +165,7 @@ def draw_initial_state(starts: StartDistribution, *parts: str | int) -> InitialS
         position_m=positions,
         station_m=stations,
         present=np.array(present),
-        lazy_noise=LazyNoise(generator, (len(players), starts.steps, 2), starts.step_s),
+        lazy_noise=LazyNoise(generator, (len(players), world.steps, 2), world.step_s),
         lapses=tuple(lapses),
         shoulder_glance=np.array(shoulder_glance),
         limits=tuple(limits),
@@ -202,8 +198,7 @@ def _varied(bounds: tuple[float, float], name: str, *parts: str | int) -> float:
 
 def draw_member(shares: Sequence[float], player: int, *parts: str | int) -> int:
     """Draw the index of a player's driver by their shares, from a separate generator: other draws do not change."""
-    upper = np.cumsum(shares)
-    return int(np.searchsorted(upper, generator_of(*parts, "member", player).random() * upper[-1], side="right"))
+    return drawn_index(shares, generator_of(*parts, "member", player))
 
 
 def member_in_episode(shares: Sequence[float], player: int, seed: int, episode: int) -> int:
@@ -225,9 +220,9 @@ def _limits(human_factors: HumanFactors, starts: StartDistribution, player: int,
     fails_to_see = bool(failing) and generator("missing").random() < failing
     errors = None
     if sight.distance_error or sight.closing_error_per_s:
-        errors = draw_estimation_errors(sight, starts.steps, starts.step_s, generator("sight"))
+        errors = draw_estimation_errors(sight, starts.world.steps, starts.world.step_s, generator("sight"))
     return Limits(
-        delay_steps=round(delay_s / starts.step_s),
+        delay_steps=round(delay_s / starts.world.step_s),
         sight_m=min(sight.range_m, sight.noticed_within_m) if fails_to_see else sight.range_m,
         field_of_view_rad=float(np.deg2rad(sight.field_of_view_deg)),
         estimation_errors=errors,

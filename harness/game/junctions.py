@@ -21,12 +21,12 @@ CELL_M = 8.0  # of the grid of a stream's samples
 KERB_M = 0.3  # a walker waits this far before the side of a lane
 _DTYPES = {
     **dict.fromkeys(("player", "stream", "own_link", "other_link", "control", "link"), np.int64),
-    **dict.fromkeys(("crossing", "yields", "first_come", "across"), np.bool_),
+    **dict.fromkeys(("yields", "first_come", "across"), np.bool_),
 }
 
 
 _USUAL: Mapping[str, Any] = {
-    **{"crossing": True, "yields": False, "first_come": False, "across": False, "own_link": -1, "other_link": -1},
+    **{"yields": False, "first_come": False, "across": False, "own_link": -1, "other_link": -1},
     **dict.fromkeys(("right_m", "from_m"), -np.inf),
     **dict.fromkeys(("left_m", "until_m"), np.inf),
 }
@@ -75,7 +75,6 @@ class Conflicts(NamedTuple):
     stream: IntArray
     begin_m: FloatArray  # stations of the zone
     end_m: FloatArray
-    crossing: BoolArray  # the stream crosses; else it joins
     yields: BoolArray  # the player must yield to the stream while no signal says otherwise
     first_come: BoolArray  # the side that arrives first has priority: all-way stops, zippers
     stop_m: FloatArray  # station of the player's stop line
@@ -117,7 +116,7 @@ class Streams(NamedTuple):
     rows: IntArray
     first_conflict: IntArray  # [P, S] the player's conflicts with a stream: the first row of `conflicts`
     last_conflict: IntArray  # [P, S] and the row after the last one
-    conflicts: FloatArray  # [C, 18] the columns of `Conflicts` in one array
+    conflicts: FloatArray  # [C, 17] the columns of `Conflicts` in one array
 
     @classmethod
     def of(cls, samples: FloatArray, stream: IntArray, conflicts: Conflicts, players: int) -> Streams:

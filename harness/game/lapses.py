@@ -95,7 +95,9 @@ def draw_lapses(attention: Attention, steps: int, step_s: float, generator: np.r
     """Draw the lapses of one player for a game of `steps` steps of `step_s` seconds.
 
     Lapses also occur before the game. The probability that a game starts within a lapse is therefore the long-run
-    share of time in lapses (stationary start of a renewal process).
+    share of time in lapses. The length of this lapse is drawn as that of any other, and a share of it, drawn uniformly,
+    is before the game. In a stationary renewal process it would be a longer one: long lapses cover a given time more
+    often.
     """
     lapses = replace(Lapses.none(steps), held=attention.controls == "held")
     starts_within = generator.random() < attention.mean_lapse_s / (attention.mean_lapse_s + attention.mean_attentive_s)

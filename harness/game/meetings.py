@@ -215,7 +215,7 @@ def _passage_s(begin_m: float, end_m: float, speed_mps: float) -> tuple[float, f
 
 @compiled
 def has_duty(conflict: FloatArray, own: int, other: int, other_first: bool) -> bool:
-    """Whether the player must yield in a conflict [18], a row of `Streams.conflicts`, given the signals of both sides.
+    """Whether the player must yield in a conflict [17], a row of `Streams.conflicts`, given the signals of both sides.
 
     A stream on red has no priority, a player on red has none over a stream that is not, a player on 'G' yields to no
     stream, and any other player at these lights yields to a stream on 'G'. Otherwise the signs of the junction decide.

@@ -112,10 +112,7 @@ def _observe(tables: tuple[tuple[Any, ...], ...], perceived: Perceived, moving: 
         if players.present[g, p]:
             place = on_route(players.station_m[g, p], views.offset_m[g, p], p, routes)
             heading_rad, own_mps = players.heading_rad[g, p], players.speed_mps[g, p]
-            reach_m = min(players.visibility_m[g], SEEN_M)
-            sight = (min(players.sight_m[g, p], reach_m), reach_m, players.sight_cosine[g, p])
-            size_m = (views.length_m[p], views.width_m[p])
-            eyes: Eyes = (np.cos(heading_rad), np.sin(heading_rad), *sight, players.shoulder_glance[g, p], *size_m)
+            eyes = _eyes(players, (views.length_m[p], views.width_m[p]), (g, p))
             error = players.distance_error[g, p]
             view[:] = 0.0
             _see_own_motion(view, players, views, (g, p))
@@ -173,6 +170,41 @@ def _observe(tables: tuple[tuple[Any, ...], ...], perceived: Perceived, moving: 
             for k in range(SIZE):
                 observation[g, p, k] = _scaled(view[k], SCALE[k], COMPRESSED[k])
     return observation
+
+
+def seen_bodies(q: Quantities, seen: Seen) -> BoolArray:
+    """[G, P, B] all bodies that players see, by what they take them to be: an observation has the most urgent ones."""
+    moving = q.bodies.present.shape[1] - len(q.world.hiding.obstacles)
+    sizes_m = (q.world.length_m, q.world.width_m)
+    return _seen_bodies(_columns(q.state), sizes_m, (seen.bodies.present, seen.hidden), seen.motion, moving)
+
+
+@compiled
+def _seen_bodies(
+    columns: tuple[Any, ...],
+    sizes_m: tuple[FloatArray, FloatArray],
+    bodies: tuple[BoolArray, BoolArray],
+    perceived: Perceived,
+    moving: int,
+) -> BoolArray:
+    players, (length_m, width_m), (present, hidden) = _Players(*columns), sizes_m, bodies
+    seen = np.zeros(hidden.shape, dtype=np.bool_)
+    for g, p in np.ndindex(players.present.shape):
+        if players.present[g, p]:
+            eyes = _eyes(players, (length_m[p], width_m[p]), (g, p))
+            for b in range(hidden.shape[2]):
+                dx, dy = perceived[0, g, p, b] - players.x_m[g, p], perceived[1, g, p, b] - players.y_m[g, p]
+                is_there = present[g, b] and b != p and not hidden[g, p, b]
+                seen[g, p, b] = is_there and in_view(eyes, dx, dy, b < moving)
+    return seen
+
+
+@inlined
+def _eyes(players: _Players, size_m: tuple[float, float], who: tuple[int, int]) -> Eyes:
+    g, p = who
+    heading_rad, reach_m = players.heading_rad[g, p], min(players.visibility_m[g], SEEN_M)
+    sight = (min(players.sight_m[g, p], reach_m), reach_m, players.sight_cosine[g, p], players.shoulder_glance[g, p])
+    return (np.cos(heading_rad), np.sin(heading_rad), *sight, *size_m)
 
 
 @inlined

@@ -136,7 +136,7 @@ class Quantities:
         return OnPath(*on_path(self.state.station_m, self.lateral_offset_m, routes, boxes))
 
     @cached_property
-    def _leader_gaps_m(self) -> FloatArray:
+    def leader_gaps_m(self) -> FloatArray:
         """[G, P, B] gaps to the bodies ahead that overlap the player's width; inf to others."""
         path = self.on_path
         overlaps = np.abs(path.left_m) < path.half_width_m + 0.5 * self.world.width_m[:, None]
@@ -148,12 +148,12 @@ class Quantities:
     def leader_gap_m(self) -> FloatArray:
         """Trailing distance: gap, bumper to bumper along the route, to the nearest body ahead that overlaps the
         player's width; inf without one."""
-        return self._leader_gaps_m.min(-1)
+        return self.leader_gaps_m.min(-1)
 
     @cached_property
     def leader(self) -> IntArray:
         """The body with this gap; -1 without one."""
-        return np.where(np.isfinite(self.leader_gap_m), self._leader_gaps_m.argmin(-1), -1)
+        return np.where(np.isfinite(self.leader_gap_m), self.leader_gaps_m.argmin(-1), -1)
 
     @cached_property
     def time_gap_s(self) -> FloatArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -21,6 +22,12 @@ def generator_of(*parts: str | int) -> np.random.Generator:
 def parts_of(seed: int, episode: int) -> tuple[str | int, ...]:
     """The parts that name the random numbers of an episode; `seed` is that of the starts, the same in every arm."""
     return ("assessment", seed, "episode", episode)
+
+
+def drawn_index(shares: Sequence[float], generator: np.random.Generator) -> int:
+    """Draw an index by shares, whose sum need not be 1."""
+    upper = np.cumsum(shares)
+    return int(np.searchsorted(upper, generator.random() * upper[-1], side="right"))
 
 
 def between(bounds: tuple[float, float], share: float) -> float:

@@ -64,7 +64,7 @@ class State:
     friction: FloatArray  # [G] coefficient of friction of the road
     visibility_m: FloatArray  # [G] distance up to which bodies are seen
     limit_share: FloatArray  # [G] factor on the speed limits
-    signals: IntArray  # [G, L] int8, states of signal links (`right_of_way.Signal`)
+    signals: IntArray  # [G, L] int8, states of signal links (`junctions.Signal`)
     signal_s: FloatArray  # [G, L] seconds since they changed
 
     @classmethod
@@ -125,44 +125,32 @@ class Bodies(NamedTuple):
     def with_nearest(self, background: Bodies) -> Bodies:
         """These bodies (the players), followed by the `NEAREST` background vehicles, sorted by distance to the nearest
         player. A vehicle farther than `NOTICED_M` from every player is not present."""
-        columns, present = _with_nearest(tuple(self), tuple(background))
-        return Bodies._make((*columns, present))
+        nearest, present = nearest_to_players(background, self)
+        added = (*(np.take_along_axis(each, nearest, 1) for each in background[:-1]), present)
+        return Bodies._make(np.concatenate(pair, axis=1) for pair in zip(self, added, strict=True))
+
+
+def nearest_to_players(others: Bodies, players: Bodies) -> tuple[IntArray, BoolArray]:
+    """[G, N] the `NEAREST` of other bodies, sorted by the distance to the nearest player, and which of them a game
+    considers."""
+    of_others, of_players = ((each.x_m, each.y_m, each.present) for each in (others, players))
+    away_m = _distance_to_nearest_m(of_others, of_players)
+    nearest = away_m.argsort(axis=1, kind="stable")[:, :NEAREST]
+    return nearest, np.take_along_axis(away_m, nearest, 1) <= NOTICED_M
 
 
 @compiled
-def _with_nearest(players: tuple[Any, ...], vehicles: tuple[Any, ...]) -> tuple[FloatArray, BoolArray]:
-    """[C, G, B] the columns of players and added vehicles but the last, and [G, B] which are present."""
-    among, background = Bodies(*players), Bodies(*vehicles)
-    of_players, of_vehicles = players[:-1], vehicles[:-1]
-    games, player_count = among.present.shape
-    added = min(NEAREST, background.present.shape[1])
-    columns = np.empty((len(players) - 1, games, player_count + added))
-    present = np.empty((games, player_count + added), dtype=np.bool_)
-    nearest, nearest_m = np.empty(NEAREST + 1, dtype=np.int64), np.empty(NEAREST + 1)
-    for g in range(games):
-        count = 0
-        for vehicle in range(background.present.shape[1]):
-            distance_m = np.inf
-            if background.present[g, vehicle]:
-                for p in range(player_count):
-                    if among.present[g, p]:
-                        dx = background.x_m[g, vehicle] - among.x_m[g, p]
-                        dy = background.y_m[g, vehicle] - among.y_m[g, p]
-                        distance_m = min(distance_m, np.hypot(dx, dy))
-            place = count  # after vehicles at the same distance
-            while place > 0 and distance_m < nearest_m[place - 1]:
-                nearest[place], nearest_m[place] = nearest[place - 1], nearest_m[place - 1]
-                place -= 1
-            nearest[place], nearest_m[place] = vehicle, distance_m
-            count = min(count + 1, NEAREST)
-        present[g, :player_count] = among.present[g]
-        for k in range(added):
-            present[g, player_count + k] = nearest_m[k] <= NOTICED_M
-        for column in range(len(of_players)):
-            columns[column, g, :player_count] = of_players[column][g]
-            for k in range(added):
-                columns[column, g, player_count + k] = of_vehicles[column][g, nearest[k]]
-    return columns, present
+def _distance_to_nearest_m(others: tuple[Any, ...], players: tuple[Any, ...]) -> FloatArray:
+    """[G, B] the distances of bodies to the nearest player; inf for one that is not present."""
+    (x_m, y_m, present), (players_x_m, players_y_m, plays) = others, players
+    away_m = np.full(present.shape, np.inf)
+    for g, b in np.ndindex(present.shape):
+        if present[g, b]:
+            for p in range(plays.shape[1]):
+                if plays[g, p]:
+                    dx, dy = x_m[g, b] - players_x_m[g, p], y_m[g, b] - players_y_m[g, p]
+                    away_m[g, b] = min(away_m[g, b], np.hypot(dx, dy))
+    return away_m
 
 
 @compiled

@@ -25,20 +25,15 @@ class World:
     width_m: FloatArray
     step_s: float
     time_limit_s: float
+    walks: BoolArray
+    """[P] players on foot."""
     right_of_way: RightOfWay = NO_JUNCTIONS
-    on_foot: tuple[bool, ...] = ()
-    """Which players walk; empty if none does."""
     hiding: Hiding = NOTHING_HIDES
 
     @cached_property
     def roles(self) -> tuple[str, ...]:
         """The players' names, as `roles_of`."""
         return roles_of(len(self.length_m))
-
-    @cached_property
-    def walks(self) -> BoolArray:
-        """[P] players on foot."""
-        return np.array(self.on_foot or [False] * len(self.length_m), dtype=bool)
 
     def on_carriageway(self, x_m: FloatArray, y_m: FloatArray) -> FloatArray:
         """[G, P] 1 for players on foot at points [G, P] of the carriageway, else 0."""

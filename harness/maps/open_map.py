@@ -19,7 +19,7 @@ from harness.maps.game_plans import GamePlan, Plans
 from harness.maps.import_map import import_map
 from harness.maps.map_traffic import read_traffic
 from harness.road.demand.route_file import RouteFile
-from harness.road.net.net_listing import ListedJunction, ListedLane, edges_near, listed
+from harness.road.net.net_listing import edges_within
 from harness.road.net.network import junctions_near, nodes_of
 from harness.road.net.tiles import Tile, write_tiles
 from harness.road.xml.xml_file import number_of, parse_xml
@@ -51,7 +51,7 @@ class OpenMap:
 
     def near(self, edge: str | None, within_m: float) -> list[GamePlan]:
         """The plans at junctions near an edge; None: all. Raises UsageError if there is no such edge."""
-        edges = edges_near(self.net, self.source, edge, within_m)
+        edges = edges_within(self.net, self.source, edge, within_m)
         junctions = {node.getID() for node in nodes_of(edges)}
         return [plan for plan in self.plans if plan.candidate.junction in junctions]
 
@@ -63,9 +63,6 @@ class OpenMap:
         names = [unescape(self.net.getEdge(name).getName() or "") for way in ways for name in way.edges]
         streets = " / ".join(dict.fromkeys(name for name in names if name)) or f"junction {candidate.junction}"
         return f"{streets} ({candidate.place[0]:.0f}, {candidate.place[1]:.0f})"
-
-    def listed(self) -> tuple[list[ListedLane], list[ListedJunction]]:
-        return listed(self.net.getEdges(withInternal=False))
 
 
 def open_map(

@@ -17,7 +17,7 @@ from harness.game.arrays import FloatArray, IntArray
 from harness.game.initial_state import InitialState, StartDistribution, draw_initial_state
 from harness.game.outcome import Outcome
 from harness.game.roles import EGO
-from harness.game.seeding import generator_of, seed_of
+from harness.game.seeding import seed_of
 from harness.road.scene.open_scene import OpenScene
 
 
@@ -83,8 +83,7 @@ class PairedRollouts:
         arena, scene = self._arena, self._scene
         arena.reload(seed_of(*self._starts.parts, "load", load) % 2**31)
         starts = {tile: self._starts.start(load * self._tiles + tile) for tile in range(self._tiles)}
-        departures = {tile: scene.departures(generator_of(*start.parts, "others")) for tile, start in starts.items()}
-        arena.reset(starts, departures if scene.has_background_traffic else {})
+        arena.reset(starts, {tile: scene.departures(*start.parts) for tile, start in starts.items()})
         payoff = np.zeros(self._tiles)
         while arena.state.running[:, EGO].any():
             payoff += arena.step().payoff[:, EGO]

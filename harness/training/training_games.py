@@ -12,9 +12,8 @@ from harness.drivers.mixture import Mixture, factors_of, shares_of
 from harness.drivers.policy_file import Policy
 from harness.drivers.protocol import Driver
 from harness.environments.auto_reset import Replays
-from harness.environments.joined_arenas import SeatedGames, open_arenas
 from harness.environments.seats import Seat, seats_of
-from harness.environments.vector_env import ArenaVecEnv, JoinedVecEnv
+from harness.environments.vector_env import ArenaVecEnv, JoinedVecEnv, open_arenas
 from harness.game.initial_state import StartDistribution
 from harness.game.seeding import seed_of
 from harness.road.scene.open_scene import OpenScene
@@ -82,7 +81,7 @@ def open_games(spec: TrainingSpec) -> JoinedVecEnv:
     for place, own_games in zip(spec.places, games, strict=True):
         seats = [seats_of(each, paid=False) for each in place.drivers]
         seats[place.player] = tuple(Seat(None, each.payoff) for each in spec.personas)
-        parts.append(SeatedGames(scene=place.scene, games=own_games, seats=seats))
+        parts.append((place.scene, own_games, seats))
     environments = []
     for number, arena in enumerate(open_arenas(parts, seed=seed_of(*spec.parts, "sumo") % 2**31)):
         place = spec.places[number]

@@ -203,7 +203,7 @@ def test_new__a_scene_keeps_the_traffic_of_the_map(tmp_path: Path, new: Run) -> 
     scenes = {name: open_scene(tmp_path / "out" / "networks" / name) for name in ("t", "whole")}
     for scene in scenes.values():
         assert scene.document.game_window_s[0] == 3600.0 + scene.document.warm_up_s
-        assert len(scene.departures(np.random.default_rng(1))) > 5
+        assert len(scene.departures(1)) > 5
     routes.write_text('<routes><trip id="x" depart="0" from="no" to="-1"/></routes>')
     with pytest.raises(UsageError, match=r"own\.rou\.xml: x: the net has no edge 'no' \(name the route file"):
         new("bad", *options)

@@ -53,6 +53,11 @@ def arriving(after_s: str, speed_mps: str) -> str:
     return scene.replace("[11.0, 14.0]", speed_mps)
 
 
+def after_ego_of(speed_mps: str) -> str:
+    """The same with another range of the ego's speed."""
+    return arriving("[1.0, 2.0]", "[11.0, 14.0]").replace("[11, 14]", speed_mps, 1)
+
+
 PERSONA = """
 name = "p"
 description = "a person to test with"
@@ -143,6 +148,8 @@ def test_number__an_integer_is_accepted_as_a_float(write: Write) -> None:
         (Scene, SCENE.replace("beside_ego_m", "route_m"), "non_ego", "route_m is along the route: leave out lane"),
         (Scene, SCENE.replace('lane = "approach_1"\n', ""), "ego", "position_m needs the lane of the start"),
         (Scene, arriving("[1.0, 2.0]", "[0, 14]"), "non_ego", "arrival_after_ego_s needs speeds above 0"),
+        (Scene, after_ego_of("[0, 0]"), "ego.speed_mps", "it may stand (give speeds above 0, or give non_ego route_m"),
+        (Scene, after_ego_of("[0, 9]"), "ego.speed_mps", "it may stand (give speeds above 0, or give non_ego route_m"),
         (Scene, arriving("[2.0, 1.0]", "[11, 14]"), "non_ego.arrival_after_ego_s", "is empty: write the lower end"),
         (Scene, SCENE.replace("[goal]", "[ego.goal]"), "", "non_ego has no goal: give [goal] for all players, or"),
         (Scene, SCENE + GOALS, "", "every player has a goal of its own: leave out [goal]"),

@@ -345,7 +345,7 @@ def test_soak__random_driving_in_traffic_keeps_all_invariants(tmp_path: Any, are
     waiting = list(range(4))
     for k in range(800):
         arena.reset(
-            {game: drawn(scene, k, game) for game in waiting}, {game: scene.departures(generator) for game in waiting}
+            {game: drawn(scene, k, game) for game in waiting}, {game: scene.departures(k, game) for game in waiting}
         )
         running = arena.state.running.copy()
         step = arena.step(generator.normal((0.2, 0.0), (0.5, 0.3), (4, 2, 2)))

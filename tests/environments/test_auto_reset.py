@@ -13,7 +13,6 @@ from harness.environments.arena import Arena
 from harness.environments.auto_reset import AutoReset
 from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import InitialState, draw_initial_state
-from harness.game.seeding import generator_of
 from harness.road.demand.route_file import Departure
 from harness.road.scene.open_scene import OpenScene
 from tests.support.scenes import build_scene
@@ -58,7 +57,7 @@ def test_games__of_a_tile_do_not_depend_on_other_tiles(scene: OpenScene, order: 
         assert np.array_equal(start.position_m, alone.position_m)
         assert np.array_equal(start.present, alone.present)
         assert np.array_equal(start.noise, alone.noise)
-        assert departures == (scene.departures(generator_of(*parts, "others")) if scene.has_background_traffic else [])
+        assert departures == (scene.departures(*parts))
 
 
 class _Replays:
@@ -87,8 +86,7 @@ def test_games__a_replay_takes_the_place_of_a_drawn_game_and_changes_no_other(sc
         drawn.reset(tiles)
         games.reset(tiles)
     assert replays.told == [(1, 2.5)] * 3
-    others = generator_of("pool", 3, "others")
-    departures = scene.departures(others) if scene.has_background_traffic else []
+    departures = scene.departures("pool", 3)
     for (tile, start, departing), (_, alone, as_drawn) in zip(arena.resets, plain.resets, strict=True):
         assert (start is replays.start) == (tile == 1)
         assert departing == (departures if tile == 1 else as_drawn)

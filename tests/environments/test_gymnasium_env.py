@@ -22,11 +22,12 @@ from pettingzoo.test import parallel_api_test, parallel_seed_test
 import harness
 from harness import DrivingEnv, Outcome, ParallelDrivingEnv, UsageError, make_vec, read_document
 from harness.config.persona import Persona
-from harness.drivers.policy_file import Policy, write_policy
+from harness.drivers.policy_file import write_policy
 from harness.game.observation_layout import LAYOUT
 from harness.road.scene.open_scene import OpenScene
 from harness.sumo.libsumo_simulation import LibsumoSimulation
 from harness.sumo.subprocess_simulation import SubprocessSimulation
+from tests.support.policies import constant_policy
 from tests.support.repository import REPOSITORY
 from tests.support.scenes import build_scene
 from tests.support.shipped import FOLDER, PERSON_BY_NAME, SPEEDY
@@ -46,11 +47,7 @@ def busy(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
 @pytest.fixture
 def policy(tmp_path: Path) -> Path:
     """The folder of a policy that brakes as hard as it can."""
-    tensors = {"log_deviation": np.zeros(2, dtype=np.float32)}
-    for part, outputs in (("actor", 2), ("critic", 1)):
-        tensors[f"{part}.0.weight"] = np.zeros((outputs, len(LAYOUT)), dtype=np.float32)
-        tensors[f"{part}.0.bias"] = np.array([-1.0, 0.0][:outputs], dtype=np.float32)
-    write_policy(Policy(tensors), tmp_path / "brakes")
+    write_policy(constant_policy(pedals=-1.0), tmp_path / "brakes")
     return tmp_path / "brakes"
 
 
@@ -113,16 +110,6 @@ def test_import__every_exported_name_exists() -> None:
     assert set(harness.__all__) <= set(dir(harness))
     with pytest.raises(AttributeError, match="DrivingEmv"):
         harness.DrivingEmv  # noqa: B018
-
-
-def test_docstring__names_every_entry_of_the_observation() -> None:
-    text = DrivingEnv.__doc__ or ""
-    for name in LAYOUT:
-        assert name.split("@")[0].split("_", name.startswith("other"))[-1] in text
-    assert f"({len(LAYOUT)},)" in text
-    first = {name.split("@")[0].split("_")[0]: k for k, name in reversed(list(enumerate(LAYOUT)))}
-    for word in ("other0", "other1"):
-        assert f"| {first[word]}-" in text
 
 
 def test_seed__gives_the_same_games_in_this_process_and_another(opened: Open, busy: OpenScene) -> None:

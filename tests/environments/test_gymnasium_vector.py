@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -11,9 +12,13 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
-from harness import Outcome, UsageError, VectorDrivingEnv, make_vec
+from harness import DrivingEnv, Outcome, UsageError, VectorDrivingEnv, make_vec
+from harness.drivers.policy_file import write_policy
 from harness.game.observation_layout import LAYOUT, SIZE
 from harness.road.scene.open_scene import OpenScene
+from tests.support.policies import constant_policy
+from tests.support.repository import REPOSITORY
+from tests.support.scenes import build_scene
 
 GAMES = 4
 
@@ -76,6 +81,38 @@ def test_step__a_wreck_terminates(opened: Callable[..., Any]) -> None:
     np.testing.assert_array_equal(terminated, ended)
     assert set(info["final_info"]["outcome"][ended].tolist()) == {Outcome.RAIL}
     assert not info["final_info"]["is_success"].any()
+
+
+def test_last_observation__is_of_what_a_slow_learner_knows(opened: Callable[..., Any], tmp_path: Path) -> None:
+    """A game that goes on shows the same in that step. The other player brakes: where it is known to be differs from
+    where it is."""
+    careful = (REPOSITORY / "personas" / "careful.toml").read_text(encoding="utf-8")
+    exact = "\n[perception]\ndistance_error = 0.0\nclosing_error_per_s = 0.0\n[reaction]\ndelay_s = [0.5, 0.5]\n"
+    (tmp_path / "slow.toml").write_text(careful + exact, encoding="utf-8")
+    write_policy(constant_policy(pedals=-1.0), tmp_path / "brakes")
+    persona, other = tmp_path / "slow.toml", tmp_path / "brakes"
+    arguments: dict[str, Any] = {"player": "non_ego", "persona": persona, "other": other}
+    ends, goes_on = (build_scene(tmp_path / f"{end:g}", time_limit_s=end) for end in (1.0, 2.0))
+
+    def tenth_of_one(scene: OpenScene) -> Any:
+        environment = opened(DrivingEnv, scene, **arguments)
+        environment.reset(seed=1)
+        return [environment.step(np.zeros(2))[0] for _ in range(10)][-1]
+
+    def tenth_of_many(scene: OpenScene) -> Any:
+        environment = opened(make_vec, GAMES, scene=scene, **arguments)
+        environment.reset(seed=1)
+        observations, _, _, ended, info = [environment.step(actions()) for _ in range(10)][-1]
+        return np.stack(info["final_obs"]) if ended.all() else observations
+
+    def tenth_of_sb3(scene: OpenScene) -> Any:
+        environment = opened(make_vec, GAMES, scene=scene, interface="sb3", **arguments)
+        environment.reset()
+        observations, _, ended, infos = [environment.step(actions()) for _ in range(10)][-1]
+        return np.stack([info["terminal_observation"] for info in infos]) if ended.all() else observations
+
+    for tenth in (tenth_of_one, tenth_of_many, tenth_of_sb3):
+        np.testing.assert_array_equal(tenth(ends), tenth(goes_on), err_msg=tenth.__name__)
 
 
 @pytest.mark.parametrize(

@@ -41,7 +41,7 @@ def test_others__of_the_route_file_are_seen_and_hit(
     arena = arena_of(scene)
     moved_mps: list[float] = []
     start = placed(scene, (30.0, RIGHT_Y - 0.5, 0.0, 10.0), (30.0, LEFT_Y, 0.0, 10.0))
-    arena.reset({0: start}, {0: scene.departures(np.random.default_rng(1))})
+    arena.reset({0: start}, {0: scene.departures(1)})
     while arena.state.outcome[0, 0] == Outcome.RUNNING:
         before_m = arena.state.x_m[0, 0]
         seen = dict(zip(LAYOUT, arena.observation[0, 0].tolist(), strict=True))
@@ -74,7 +74,7 @@ def test_persons__of_all_games_leave_at_the_reset(tmp_path: Path, arena_of: Open
     scene = build_scene(tmp_path / "scene", others=flow)
     arena = arena_of(scene, 2, recorded=True)
     start = placed(scene, (30.0, RIGHT_Y, 0.0, 0.0), (30.0, LEFT_Y, 0.0, 0.0))
-    departures = scene.departures(np.random.default_rng(1))
+    departures = scene.departures(1)
     arena.reset({0: start, 1: start}, {0: departures, 1: departures})
     for _ in range(50):
         arena.step(np.zeros((2, 2, 2)))

@@ -21,7 +21,6 @@ from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
 from harness.game.initial_state import draw_initial_state
 from harness.game.outcome import Outcome
-from harness.game.seeding import generator_of
 from harness.road.scene.open_scene import OpenScene
 from tests.support.repository import REPOSITORY
 from tests.support.scenes import build_scene
@@ -76,7 +75,7 @@ class Counting:
     def reset(self, *games: int) -> None:
         scene = self.arena.scene  # without lapses of attention no player leaves the road
         starts = {game: draw_initial_state(scene.usual_starts, "cost", game) for game in games}
-        self.arena.reset(starts, {game: scene.departures(generator_of(1)) for game in games})
+        self.arena.reset(starts, {game: scene.departures(1) for game in games})
 
     def steps(self, count: int = STEPS) -> None:
         for _ in range(count):

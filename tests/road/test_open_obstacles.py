@@ -108,7 +108,7 @@ def _fronts_after(scene: OpenScene, seconds: float) -> dict[str, float]:
     away = placed(scene, (280.0, LEFT_Y if scene.lane_strips[-1].name == "road_1" else RIGHT_Y, 0.0, 0.0), None)
     farthest: dict[str, float] = {}
     with closing(Arena(scene, 1, [Seat(None), Seat(None)], recorded=True)) as arena:
-        arena.reset({0: away}, {0: scene.departures(np.random.default_rng(1))})
+        arena.reset({0: away}, {0: scene.departures(1)})
         for _ in range(round(seconds / scene.world.step_s)):
             arena.step()
             assert arena.reading is not None

@@ -10,7 +10,11 @@ import numpy as np
 import pytest
 
 from harness.errors import Problem, UsageError
+from harness.game.geometry import Box
+from harness.game.quantities import REACH_M
+from harness.game.rails import Rails
 from harness.road.scene.open_scene import OpenScene, open_scene
+from tests.support.scenes import CARS, CROSSING, CROSSING_EDGES, CROSSING_NODES, build_scene
 
 
 @pytest.fixture
@@ -47,13 +51,25 @@ def test_merge__opens(merge: OpenScene) -> None:
     assert world.actuators.friction == 0.8
     assert merge.edges == (("approach", "exit"), ("approach", "exit"))
     assert merge.vehicle(1).vehicle_type == "person_car"
-    assert merge.departures(np.random.default_rng(0)) == []  # there is no background traffic
+    assert merge.departures(0) == []  # there is no background traffic
+
+
+def test_rails__are_found_as_far_as_a_long_player_reaches(tmp_path: Path) -> None:
+    """Beside the roads of a crossing, where only the ends of a player of 40 m are near the rails."""
+    long = CARS.replace('id="person_car" length="4.6"', 'id="person_car" length="40"')
+    scene = build_scene(tmp_path / "long", CROSSING_NODES, CROSSING_EDGES, CROSSING, cars=long, goal_m=50.0)
+    own, everything = scene.world.road.rails, Rails.of(scene.world.road.rails.segments[:-1], 200.0)
+    x_m, y_m = np.meshgrid(np.arange(0.0, 200.0, 7.0), np.arange(0.0, 200.0, 1.0))
+    cars = Box(x_m, y_m, np.full(x_m.shape, 0.5 * np.pi), np.full(x_m.shape[1], 40.0), np.full(x_m.shape[1], 2.5))
+    distances_m = everything.distance_m(cars, REACH_M)
+    np.testing.assert_array_equal(own.distance_m(cars, REACH_M), distances_m)
+    assert (distances_m < REACH_M).any()
 
 
 def test_scene__departures_are_those_of_the_background_traffic(folder: Path) -> None:
     flow = '<flow id="more" type="person_car" route="through" begin="1" period="10" departLane="1"/>'
     change(folder, "merge.rou.xml", "</routes>", f"{flow}</routes>")
-    departures = open_scene(folder).departures(np.random.default_rng(0))
+    departures = open_scene(folder).departures(0)
     assert [(each.name, each.depart_s) for each in departures] == [("more.0", 1.0), ("more.1", 11.0), ("more.2", 21.0)]
 
 

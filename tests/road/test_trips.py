@@ -11,7 +11,6 @@ import pytest
 
 from harness.environments.arena import Arena, Seat
 from harness.errors import UsageError
-from harness.game.seeding import generator_of
 from harness.road.demand import trips
 from harness.road.scene.load_check import check_loads
 from harness.road.scene.open_scene import OpenScene
@@ -33,7 +32,7 @@ def crossing(folder: Path, others: str, edges: str = CROSSING_EDGES, cars: str =
 
 def test_trip__has_a_route_in_the_game(tmp_path: Path) -> None:
     scene = crossing(tmp_path, '<flow id="f" from="sc" to="ce" period="9"/><trip id="t" from="wc" to="cn" depart="1"/>')
-    found = {each.name: each.edges for each in scene.departures(generator_of(1))}
+    found = {each.name: each.edges for each in scene.departures(1)}
     assert found == {"f.0": ("sc", "ce"), "f.1": ("sc", "ce"), "f.2": ("sc", "ce"), "t": ("wc", "cn")}
     check_loads(scene)
 
@@ -42,7 +41,7 @@ def test_trip__of_a_mix_has_a_route_for_each_type(tmp_path: Path) -> None:
     mix = '<vTypeDistribution id="mix"><vType id="b" vClass="bus"/><vType id="d" vClass="coach"/></vTypeDistribution>'
     edges = CROSSING_EDGES.replace('id="cn"', 'id="cn" allow="bus coach"')
     scene = crossing(tmp_path, '<flow id="f" type="mix" from="sc" to="cn" period="1"/>', edges, CARS + mix)
-    drawn_types = {each.vehicle_type: each.edges for each in scene.departures(generator_of(1))}
+    drawn_types = {each.vehicle_type: each.edges for each in scene.departures(1)}
     assert drawn_types == {"b": ("sc", "cn"), "d": ("sc", "cn")}
 
 
@@ -63,12 +62,12 @@ def test_trip__without_a_route_is_named(tmp_path: Path, others: str, message: st
 
 def test_trip__after_the_end_of_a_game_does_not_matter(tmp_path: Path) -> None:
     scene = crossing(tmp_path, '<trip id="t" from="ce" to="wc" depart="20"/>')  # games end at 20 s
-    assert scene.departures(generator_of(1)) == []
+    assert scene.departures(1) == []
 
 
 def test_routes__are_found_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     others = '<trip id="t" from="wc" to="cn" depart="1"/>'
-    first = crossing(tmp_path / "a", others).departures(generator_of(1))
+    first = crossing(tmp_path / "a", others).departures(1)
 
     def fail(*_: object) -> None:
         raise AssertionError("duarouter runs again")
@@ -78,7 +77,7 @@ def test_routes__are_found_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(
         Path, "read_bytes", lambda path, read=Path.read_bytes: read(net if path.name == net.name else path)
     )
-    assert crossing(tmp_path / "b", others).departures(generator_of(1)) == first
+    assert crossing(tmp_path / "b", others).departures(1) == first
 
 
 def test_stop__holds_a_vehicle_in_the_game(tmp_path: Path) -> None:
@@ -89,7 +88,7 @@ def test_stop__holds_a_vehicle_in_the_game(tmp_path: Path) -> None:
     check_loads(scene)
     speeds = []
     with closing(Arena(scene, 1, [Seat(None), Seat(None)], recorded=True)) as arena:
-        arena.reset({0: drawn(scene, 1, present=(1.0, 0.0))}, {0: scene.departures(generator_of(1))})
+        arena.reset({0: drawn(scene, 1, present=(1.0, 0.0))}, {0: scene.departures(1)})
         for _ in range(150):
             arena.step(np.tile([-1.0, 0.0], (1, 2, 1)))  # the players brake
             reading = arena.reading

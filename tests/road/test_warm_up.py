@@ -15,7 +15,6 @@ import pytest
 from harness.environments.arena import Arena, Seat
 from harness.errors import UsageError
 from harness.game.observation_layout import LAYOUT, in_units
-from harness.game.seeding import generator_of
 from harness.road.demand import warm_up
 from harness.road.demand.route_file import Departure
 from harness.road.scene.load_check import check_loads
@@ -55,7 +54,7 @@ def on_road(departures: Sequence[Departure]) -> list[Departure]:
 
 
 def test_game__begins_with_traffic_on_the_road(scene: OpenScene) -> None:
-    vehicles = on_road(scene.departures(generator_of("a")))
+    vehicles = on_road(scene.departures("a"))
     assert len(vehicles) >= 6  # 300 m at 13.89 m/s take 21.6 s: 5.4 vehicles on the right lane alone
     assert {each.name.split(".")[0] for each in vehicles} == {"right", "left"}
     assert all(each.motion and 0.0 < each.motion.x_m < 300.0 and each.motion.speed_mps > 5.0 for each in vehicles)
@@ -63,7 +62,7 @@ def test_game__begins_with_traffic_on_the_road(scene: OpenScene) -> None:
 
 def test_game__later_vehicles_follow_the_rhythm_of_the_flow(scene: OpenScene) -> None:
     # vehicles 0 to 9 depart at 0, 4, ... 36 s, before the game begins at 40 s
-    later = [each for each in scene.departures(generator_of("a")) if each.name.startswith("right") and not each.motion]
+    later = [each for each in scene.departures("a") if each.name.startswith("right") and not each.motion]
     assert [(each.name, each.depart_s) for each in later] == [(f"right.{10 + k}", 4.0 * k) for k in range(5)]
 
 
@@ -71,14 +70,14 @@ def test_game__begins_with_persons_on_their_way(tmp_path: Path) -> None:
     people = """<personFlow id="walkers" begin="0" end="100" period="10">
         <walk edges="road" arrivalPos="250"/></personFlow>"""
     scene = warmed(tmp_path / "scene", people, "warm_up_s = 40.0")
-    found = sorted(on_road(scene.departures(generator_of("a"))), key=lambda each: each.name)
+    found = sorted(on_road(scene.departures("a")), key=lambda each: each.name)
     assert [each.name for each in found] == [f"walkers.{k}.warm" for k in range(4)]
     # they began 40, 30, 20 and 10 s ago, at 5 km/h, with SUMO's differences of 10 % between persons and its dawdling
     walked_m = np.array([float(each.position) for each in found])
     assert walked_m / np.array([40.0, 30.0, 20.0, 10.0]) == pytest.approx(1.25, abs=0.4)
     with closing(Arena(scene, 1, [Seat(None), Seat(None)], recorded=True)) as arena:
         away = placed(scene, (150.0, -4.8, 0.0, 0.0), (150.0, -1.6, 0.0, 0.0))
-        arena.reset({0: away}, {0: scene.departures(generator_of("a"))})
+        arena.reset({0: away}, {0: scene.departures("a")})
         for _ in range(2):
             arena.step(np.zeros((1, 2, 2)))
         assert arena.reading is not None
@@ -87,16 +86,16 @@ def test_game__begins_with_persons_on_their_way(tmp_path: Path) -> None:
 
 
 def test_game__with_the_same_seed_has_the_same_traffic(scene: OpenScene) -> None:
-    first = scene.departures(generator_of("a"))
+    first = scene.departures("a")
     again = open_scene(scene.folder)
-    assert again.departures(generator_of("a")) == first  # from the cache
-    assert {str(again.departures(generator_of(k))) for k in range(5)} != {str(first)}
+    assert again.departures("a") == first  # from the cache
+    assert {str(again.departures(k)) for k in range(5)} != {str(first)}
 
 
 def test_density__is_drawn_for_each_game(tmp_path: Path) -> None:
     flow = FLOW.replace('period="4"', 'period="2"')
     scene = warmed(tmp_path / "scene", flow, "varies = { traffic_density = [0.5, 1.5] }")
-    counts = [sum(each.name.startswith("right") for each in scene.departures(generator_of(k))) for k in range(200)]
+    counts = [sum(each.name.startswith("right") for each in scene.departures(k)) for k in range(200)]
     # in 20 s at density d: 10 d vehicles, rounded up, d from 0.5 to 1.5
     assert min(counts) in (5, 6)
     assert max(counts) == 15
@@ -114,7 +113,7 @@ def test_density__of_a_warmed_game_is_that_of_its_warm_up(tmp_path: Path) -> Non
 @pytest.mark.parametrize("games", [1, 3])
 def test_arena__has_the_vehicles_where_the_warm_up_left_them(scene: OpenScene, games: int) -> None:
     start = drawn(scene, 1)
-    departures = scene.departures(generator_of("b"))
+    departures = scene.departures("b")
     expected = clear_of_players(departures, start, scene.world.length_m)
     with closing(Arena(scene, games, [Seat(Steady()), Seat(Steady())], recorded=True)) as arena:
         for _ in range(2):  # a second game begins as the first one did
@@ -131,7 +130,7 @@ def test_arena__has_the_vehicles_where_the_warm_up_left_them(scene: OpenScene, g
 
 
 def test_first_observation__shows_the_vehicles_of_the_warm_up(scene: OpenScene) -> None:
-    van = next(each for each in on_road(scene.departures(generator_of("b"))) if each.lane == "road_0")
+    van = next(each for each in on_road(scene.departures("b")) if each.lane == "road_0")
     assert van.motion is not None
     start = placed(scene, (van.motion.x_m - 40.0, van.motion.y_m, 0.0, 10.0), None)
     with closing(Arena(scene, 1, [Seat(Steady()), Seat(Steady())])) as arena:
@@ -155,7 +154,7 @@ def test_trace__has_the_vehicles_from_the_first_sample_on(scene: OpenScene) -> N
 
 def test_start__is_clear_of_vehicles(scene: OpenScene) -> None:
     start = drawn(scene, 1)
-    kept = on_road(clear_of_players(scene.departures(generator_of("b")), start, scene.world.length_m))
+    kept = on_road(clear_of_players(scene.departures("b"), start, scene.world.length_m))
     assert kept
     for each in kept:
         assert each.motion is not None

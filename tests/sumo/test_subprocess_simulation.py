@@ -68,7 +68,7 @@ def test_both__give_the_same_numbers(scene: OpenScene) -> None:
         for seed in (1, 2):
             arena.reload(seed)
             starts = {game: drawn(scene, "both", game) for game in range(2)}
-            arena.reset(starts, {game: scene.departures(np.random.default_rng(game)) for game in range(2)})
+            arena.reset(starts, {game: scene.departures(game) for game in range(2)})
             for action in actions:
                 arena.step(action)
                 results += [arena.observation.tobytes(), arena.state.x_m.tobytes(), arena.state.outcome.tobytes()]

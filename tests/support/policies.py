@@ -1,4 +1,4 @@
-"""A small policy of random parameters."""
+"""Small policies: of random parameters, and of one action."""
 
 from __future__ import annotations
 
@@ -21,3 +21,12 @@ def some_policy(seed: int = 0, hidden: int = 5) -> Policy:
         tensors |= {f"{part}.0.weight": array(hidden, SIZE), f"{part}.0.bias": array(hidden)}
         tensors |= {f"{part}.1.weight": array(outputs, hidden), f"{part}.1.bias": array(outputs)}
     return Policy(tensors, {"stage": "naive-seed1"})
+
+
+def constant_policy(pedals: float, wheel: float = 0.0) -> Policy:
+    """A policy that does the same whatever it sees."""
+    tensors: dict[str, FloatArray] = {"log_deviation": np.zeros(2, dtype=np.float32)}
+    for part, outputs in (("actor", [pedals, wheel]), ("critic", [0.0])):
+        tensors[f"{part}.0.weight"] = np.zeros((len(outputs), SIZE), dtype=np.float32)
+        tensors[f"{part}.0.bias"] = np.array(outputs, dtype=np.float32)
+    return Policy(tensors)

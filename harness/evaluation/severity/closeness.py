@@ -14,7 +14,6 @@ from harness.evaluation.recorded_game import RecordedGame
 from harness.evaluation.severity import contact
 from harness.evaluation.severity import limits as at
 from harness.game.arrays import BoolArray, FloatArray
-from harness.game.quantities import SIGHT_M
 from harness.game.state import Bodies
 
 
@@ -30,15 +29,10 @@ class Headways(NamedTuple):
 @lru_cache(maxsize=1)
 def headways(game: RecordedGame, player: int) -> Headways:
     """The headways of a player."""
-    q, world = game.quantities, game.world
-    path, speed_mps = q.on_path, q.state.speed_mps[:, player]
+    q = game.quantities
+    speed_mps = q.state.speed_mps[:, player]
     turned = q.bodies.heading_rad - q.state.heading_rad[:, player, None]
-    ahead, left = path.ahead_m[:, player], path.left_m[:, player]
-    in_way = np.abs(left) < path.half_width_m[:, player] + 0.5 * world.width_m[player]
-    leads = q.visible[:, player] & in_way & (ahead > 0.0) & (ahead < SIGHT_M)
-    leads &= np.cos(turned) > math.cos(at.LEADER_TURNED_RAD)
-    gap = np.maximum(ahead - path.half_length_m[:, player] - 0.5 * world.length_m[player], 0.0)
-    gap = np.where(leads, gap, np.inf)
+    gap = np.where(np.cos(turned) > math.cos(at.LEADER_TURNED_RAD), q.leader_gaps_m[:, player], np.inf)
     nearest = gap.argmin(-1)[:, None]
     along_mps = np.take_along_axis(q.bodies.speed_mps * np.cos(turned), nearest, -1)[:, 0]
     time_s = gap.min(-1) / np.maximum(speed_mps, 0.1)

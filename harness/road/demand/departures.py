@@ -11,7 +11,7 @@ from sumolib.net import Net
 from sumolib.net.edge import Edge
 
 from harness.config.toml_reading import nearest
-from harness.errors import Problem, UsageError, collect
+from harness.errors import MOST_PROBLEMS, Problem, UsageError, collect
 from harness.game.roles import ROLES
 from harness.road.demand.route_file import Departure, RouteFile
 from harness.road.demand.stops import stop_problems
@@ -28,7 +28,6 @@ _WORDS = {
     "arrivalSpeed": ("current",),
 }
 """What an attribute may be beside a number."""
-_MOST_PROBLEMS = 20
 _ROUNDED = 1.001  # recorded speeds and speed factors are rounded; SUMO raises the factor
 _ALL_THE_TIME_S = (0.0, inf)
 
@@ -90,7 +89,7 @@ def check_departures(
             problems += _end_problems(*where, departure, first=edges[0], last=edges[-1], routes=routes)
             kind = routes.types[departure.vehicle_type].vehicle_class
             problems += stop_problems(*where, stops=departure.stops, edges=edges, vehicle_class=kind)
-        if len(problems) >= _MOST_PROBLEMS:
+        if len(problems) >= MOST_PROBLEMS:
             break
     if problems:
         raise UsageError(problems)

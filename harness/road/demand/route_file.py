@@ -18,6 +18,7 @@ import numpy as np
 
 from harness.game.arrays import FloatArray
 from harness.game.follower import Follower
+from harness.game.seeding import drawn_index
 from harness.road.demand.stops import Stop
 
 SIZES_M = {
@@ -232,9 +233,9 @@ class RouteFile:
         """A departure of a game, with one type and one route, and with times from `begin_s`."""
         mix = self.mixes.get(departure.vehicle_type)
         if mix is not None:
-            departure = replace(departure, vehicle_type=mix.types[_index(mix.shares, generator)])
+            departure = replace(departure, vehicle_type=mix.types[drawn_index(mix.shares, generator)])
         if departure.choices:
-            place = _index([each.share for each in departure.choices], generator)
+            place = drawn_index([each.share for each in departure.choices], generator)
             departure = _on(departure, departure.choices[place])
         if begin_s:
             stops = tuple(stop.later(-begin_s) for stop in departure.stops)
@@ -263,11 +264,6 @@ def _placed(person: Departure, generator: np.random.Generator) -> Departure:
         for place in (person.position, person.arrival[1])
     )
     return replace(person, position=first, arrival=("", last, ""))
-
-
-def _index(shares: Sequence[float], generator: np.random.Generator) -> int:
-    upper = np.cumsum(shares)
-    return int(np.searchsorted(upper, generator.random() * upper[-1], side="right"))
 
 
 def times_of(

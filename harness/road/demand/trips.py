@@ -18,7 +18,7 @@ from xml.etree import ElementTree
 
 from sumolib.net import Net
 
-from harness.errors import Problem, UsageError, collect
+from harness.errors import MOST_PROBLEMS, Problem, UsageError, collect
 from harness.files import write_atomically
 from harness.road.demand.route_file import Departure, RouteFile, VehicleType
 from harness.road.demand.stops import placed
@@ -28,7 +28,6 @@ from harness.road.xml.sumo_program import cached_file, run_program
 from harness.road.xml.xml_file import parse_xml
 
 PATIENCE_S, PATIENCE_S_PER_BYTE = 60.0, 4e-6  # time limit: a constant, and a part per byte of the net
-MOST_PROBLEMS = 20
 _Query = tuple[str, str, tuple[str, ...]]  # vehicle class, top speed, edges from first to last
 _ON_FOOT = "person"  # in place of the class
 

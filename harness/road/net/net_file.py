@@ -16,14 +16,13 @@ from xml.etree import ElementTree
 import numpy as np
 
 from harness.config.toml_reading import nearest
-from harness.errors import Problem, UsageError
+from harness.errors import MOST_PROBLEMS, Problem, UsageError
 from harness.game.arrays import FloatArray
 from harness.road.xml.element_kinds import drop_ignored, problems_in
 from harness.road.xml.sumo_schema import attributes_of
 from harness.road.xml.xml_file import number_of, parse_xml
 
 _REMEDY = "build it with netconvert or netedit"
-_MOST_PROBLEMS = 20
 _FARTHEST_M = 2e7  # from the origin of any map projection
 _WIDEST_M = 100_000.0
 _MOST_CELLS, _CELL_M = 4e6, 20.0  # of the grid of rails
@@ -79,7 +78,7 @@ def check_net(path: Path) -> CheckedNet:
     if unknown := problems_in(path, root, _KINDS):
         raise UsageError(unknown)
     faults = chain(_attribute_faults(root), _number_faults(root), _reference_faults(root), _signal_faults(root))
-    problems = [Problem(str(path), key, message, _REMEDY) for key, message in islice(faults, _MOST_PROBLEMS)]
+    problems = [Problem(str(path), key, message, _REMEDY) for key, message in islice(faults, MOST_PROBLEMS)]
     if problems:
         raise UsageError(problems)
     if too_large := _too_large(root):

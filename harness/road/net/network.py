@@ -36,6 +36,7 @@ _MOTOR = (  # vehicle classes on roads; a paved shoulder is a lane for emergency
     *("passenger", "emergency", "private", "authority", "army", "vip", "hov", "taxi", "bus", "coach", "delivery"),
     *("truck", "trailer", "motorcycle", "moped", "evehicle"),
 )
+_RADIUS_M = 10.0  # of a player, at least, from its centre to its corners
 _BACK = -0.9  # cosine of the angle between the directions of two opposite edges
 TURNAROUNDS = (Connection.LINKDIR_TURN, Connection.LINKDIR_TURN_LEFTHAND)
 
@@ -237,10 +238,12 @@ def rail_lines(net: Net, area: BaseGeometry, own: Collection[Edge] = ()) -> list
     return [np.asarray(line.coords) for line in getattr(merged, "geoms", [merged]) if len(line.coords) > 1]
 
 
-def rails(lines: Sequence[FloatArray]) -> Rails:
-    """Rails of polylines [n, 2]. Look-ups find all segments that a player may notice."""
+def rails(lines: Sequence[FloatArray], radius_m: float = _RADIUS_M) -> Rails:
+    """Rails of polylines [n, 2]. Look-ups find all segments that a player may notice whose corners are at most
+    `radius_m` from its centre."""
     segments = [np.stack((line[:-1], line[1:]), axis=1) for line in lines]
-    return Rails.of(np.concatenate(segments) if segments else np.zeros((0, 2, 2)), REACH_M + 10.0)
+    reach_m = REACH_M + max(radius_m, _RADIUS_M)
+    return Rails.of(np.concatenate(segments) if segments else np.zeros((0, 2, 2)), reach_m)
 
 
 def find_edge(net: Net, path: Path, key: str, name: str) -> Edge:

@@ -90,7 +90,6 @@ class _Builder:
                     "stream": self._numbers.setdefault(foe, len(self._numbers)),
                     "begin_m": junction.begin_m + begin_m,
                     "end_m": junction.begin_m + (begin_m + _MERGING_M if joins else end_m),
-                    "crossing": not joins,
                     "yields": yields,
                     "first_come": first_come,
                     "stop_m": junction.begin_m,

@@ -75,13 +75,13 @@ def route_line(net: Net, route: LaneRoute) -> tuple[FloatArray, list[float]]:
 
     Raises ValueError if consecutive edges are not connected.
     """
-    points, starts = _join(_lines(net, route))
+    points, starts = joined_line(_lines(net, route))
     return points, starts.tolist()
 
 
 def line_over_junction(net: Net, link: Connection) -> FloatArray:
     """[n, 2] line of a link over its junction."""
-    return _join(connection_lines(net, link))[0]
+    return joined_line(connection_lines(net, link))[0]
 
 
 def route_table(net: Net, area: BaseGeometry, route: LaneRoute, *, goal: Edge, goal_position_m: float) -> Route:
@@ -92,7 +92,7 @@ def route_table(net: Net, area: BaseGeometry, route: LaneRoute, *, goal: Edge, g
     if goal not in route.edges:
         raise ValueError(f"does not pass the goal's edge {goal.getID()!r}")
     pieces = _pieces(net, route)
-    points, starts = _join([piece.line for piece in pieces])
+    points, starts = joined_line([piece.line for piece in pieces])
     line = shapely.LineString(points)
     stations, inside, points, headings = _sampled(line)
     piece_at = np.clip(np.searchsorted(starts, stations, side="right") - 1, 0, len(pieces) - 1)
@@ -191,7 +191,7 @@ def _between(entry: Lane, exit_: Lane) -> FloatArray:
     return first + blend * (second - first)
 
 
-def _join(lines: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+def joined_line(lines: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
     """[n, 2] the lines joined, without repeated points, and the stations [len(lines)] of their starts."""
     points = np.concatenate(lines)
     steps = np.hypot(*np.diff(points, axis=0, prepend=points[:1]).T)
@@ -287,5 +287,10 @@ def meeting_of_lines(ego_points: FloatArray, other_points: FloatArray) -> Meetin
 
 def route_points(route: Route) -> FloatArray:
     """[n, 2] the line of a route, every `SPACING_M` from its station 0."""
+    return without_extensions(route.x_m, route.y_m)
+
+
+def without_extensions(x_m: FloatArray, y_m: FloatArray) -> FloatArray:
+    """[n, 2] the points of a route's table without the straight extensions before and after its line."""
     first = round(MARGIN_M / SPACING_M)
-    return np.stack((route.x_m[first:-first], route.y_m[first:-first]), axis=1)
+    return np.stack((x_m[first:-first], y_m[first:-first]), axis=1)

@@ -16,7 +16,7 @@ from sumolib.net.lane import Lane
 
 from harness.game.arrays import FloatArray
 from harness.road.net.network import TURNAROUNDS, inner_lanes, lane_line
-from harness.road.net.route_table import line_over_junction
+from harness.road.net.route_table import joined_line, line_over_junction
 from harness.road.net.surface import lane_shape
 
 USERS = ("passenger", "bus", "truck", "motorcycle", "bicycle", "tram")
@@ -128,9 +128,8 @@ class Stream:
 
 def _joined(lines: Sequence[FloatArray]) -> shapely.LineString:
     """The line through all points, each once. Lanes inside a junction may be a single point: their length is 0."""
-    points = np.concatenate(lines)
-    apart = np.hypot(*np.diff(points, axis=0).T) > 0.0
-    return shapely.LineString(points[np.concatenate(([True], apart))] if apart.any() else points[[0, 0]])
+    points, _ = joined_line(lines)
+    return shapely.LineString(points if len(points) > 1 else points[[0, 0]])
 
 
 def samples_on(piece: Piece) -> FloatArray:

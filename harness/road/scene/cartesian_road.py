@@ -11,10 +11,11 @@ import numpy as np
 from harness.config.scene import Scene
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.cartesian_view import CartesianRoad
-from harness.game.road import MARGIN_M, SPACING_M
+from harness.game.road import SPACING_M
 from harness.game.world import World
 from harness.road.net.lane_map import lane_map, lanes_on_route, signals_on_route
 from harness.road.net.network import read_net
+from harness.road.net.route_table import without_extensions
 from harness.road.scene.open_player import lane_route
 
 CartesianRoads: TypeAlias = tuple[CartesianRoad, ...]
@@ -53,9 +54,9 @@ def cartesian_roads(
 
 def route_line_of(world: World, player: int) -> FloatArray:
     """[n, 2] the points of a player's route in its table, without the straight extensions before and after it."""
-    table, beyond = world.road.routes, round(MARGIN_M / SPACING_M)
-    rows = slice(table.first_row[player] + beyond, table.last_row[player] + 1 - beyond)
-    return np.stack((table.x_m[rows], table.y_m[rows]), axis=1)
+    table = world.road.routes
+    rows = slice(table.first_row[player], table.last_row[player] + 1)
+    return without_extensions(table.x_m[rows], table.y_m[rows])
 
 
 def signal_lines(world: World, player: int) -> IntArray:

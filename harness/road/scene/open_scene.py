@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-import numpy as np
-
 from harness.config.scene import Scene
 from harness.game.arrays import FloatArray
 from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import StartDistribution, of_people
 from harness.game.perception_errors import PerceptionErrors
 from harness.game.placed_obstacles import Obstacles
-from harness.game.seeding import between
+from harness.game.seeding import between, generator_of
 from harness.game.start_range import StartRange
 from harness.game.world import World
 from harness.road.demand.route_file import Departure, RouteFile
@@ -80,10 +78,11 @@ class OpenScene:
         """A player's vehicle in the route file."""
         return self.routes.vehicles[self.document.vehicles[player]]
 
-    def departures(self, generator: np.random.Generator) -> list[Departure]:
-        """The background vehicles that depart during a game. What is random about them is drawn from the generator."""
+    def departures(self, *parts: str | int) -> list[Departure]:
+        """The background vehicles that depart during a game, whose random numbers are named by these parts."""
         if not self.has_background_traffic:
             return []
+        generator = generator_of(*parts, "others")
         players = set(self.document.vehicles)
         begin_s, end_s = self.document.game_window_s
         varied = self.document.varies.traffic_density
@@ -94,7 +93,7 @@ class OpenScene:
             density, on_road = snapshot.density, snapshot.vehicles
         return [*on_road, *self.routes.departures(players, end_s, generator, begin_s=begin_s, density=density)]
 
-    @property
+    @cached_property
     def usual_starts(self) -> StartDistribution:
         """The distribution of initial states of attentive players, who all take part."""
         players = len(self.places)
@@ -121,15 +120,11 @@ class OpenScene:
         varies = self.document.varies
         factors_of = [[each] if isinstance(each, HumanFactors) else list(each) for each in human_factors]
         return StartDistribution(
+            world=self.world,
             places=self.places,
-            length_m=self.world.length_m,
-            max_speed_mps=self.world.actuators.max_speed_mps,
             human_factors=of_people(factors_of),
             shares=shares or [[1.0] * len(each) for each in factors_of],
             present_share=present_share,
-            steps=self.world.steps,
-            step_s=self.world.step_s,
-            routes=self.world.road.routes,
             friction=varies.friction or (self.document.friction, self.document.friction),
             visibility_m=varies.visibility_m or (self.document.visibility_m, self.document.visibility_m),
             limit_share=varies.speed_limit_share or (1.0, 1.0),

@@ -90,18 +90,18 @@ def world_of(
 ) -> World:
     """The world of a scene's games; `rail_lines` are those of the roads."""
     document, net = files.document, files.net
-    walking = tuple(player.on_foot for player in document.players)
     routes, types = [player.route for player in players], [player.vehicle_type for player in players]
     lanes = [
         LaneRoute([]) if each.on_foot else lane_route(net, each, [net.getEdge(name) for name in player.edges])
         for player, each in zip(players, document.players, strict=True)
     ]
     rules = right_of_way(net, lanes)
+    radius_m = max(0.5 * float(np.hypot(each.length_m, each.width_m)) for each in types)
     return World(
         road=Road(
-            rails(rail_lines),
+            rails(rail_lines, radius_m),
             Routes.of(routes),
-            None if ground is None else rails(ground.rail_lines),
+            None if ground is None else rails(ground.rail_lines, radius_m),
             None if ground is None else ground.raster,
         ),
         actuators=actuator_limits(document, types),
@@ -110,6 +110,6 @@ def world_of(
         step_s=document.step_length_s,
         time_limit_s=document.time_limit_s,
         right_of_way=rules if ground is None else with_walkers_conflicts(rules, net, routes, ground.ways),
-        on_foot=walking if any(walking) else (),
+        walks=np.array([player.on_foot for player in document.players]),
         hiding=hiding_in(obstacles, files.routes, document),
     )

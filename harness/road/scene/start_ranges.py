@@ -90,7 +90,7 @@ def _arrival(role: str, files: SceneFiles, route: Route, ego_route: Route) -> Ar
         message = f"its route meets the ego's at {place.ego_m:g} m, and the ego starts at up to {ego_m[1]:g} m"
         raise UsageError.of(file, key, message, "start the ego before that, or give position_m or route_m")
     least_s = (place.ego_m - ego_m[1]) / ego.speed_mps[1] + player.arrival_after_ego_s[0]
-    most_s = (place.ego_m - ego_m[0]) / max(ego.speed_mps[0], 0.1) + player.arrival_after_ego_s[1]
+    most_s = (place.ego_m - ego_m[0]) / ego.speed_mps[0] + player.arrival_after_ego_s[1]
     first_m, last_m = place.other_m - player.speed_mps[1] * most_s, place.other_m - player.speed_mps[0] * least_s
     if last_m >= place.other_m:
         message = f"it may start after the place where the routes meet, at {place.other_m:g} m of its route"

@@ -16,9 +16,9 @@ from xml.etree import ElementTree
 from sumolib.net.lane import SUMO_VEHICLE_CLASSES
 
 from harness.config.toml_reading import nearest
-from harness.errors import Problem
+from harness.errors import MOST_PROBLEMS, Problem
 
-_MOST_PROBLEMS, _MOST_WARNINGS = 20, 5
+_MOST_WARNINGS = 5
 _FILE_KEYS = ("file", "output", "device", "has.")  # parts of a param's key that make SUMO read or write files
 _CLASSES = {*SUMO_VEHICLE_CLASSES, "all", "ignoring", "drone", "aircraft"}  # vehicle classes
 _CLASS_ATTRIBUTES = ("allow", "disallow", "prefer", "vClass")
@@ -60,7 +60,7 @@ def problems_in(
     children there after the tag of their element, are passed over.
     """
     kinds = {"param": (), **known}
-    return list(islice(_problems(str(path), root, kinds, reported, where=root.tag), _MOST_PROBLEMS))
+    return list(islice(_problems(str(path), root, kinds, reported, where=root.tag), MOST_PROBLEMS))
 
 
 def _problems(
