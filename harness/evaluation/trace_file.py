@@ -156,6 +156,22 @@ def _with_strings(frame: pd.DataFrame) -> pd.DataFrame:
     return frame
 
 
+def check_traces(path: Path, episodes: Iterable[int]) -> None:
+    """Raise UsageError unless this is a file of traces with plausible numbers and all these episodes."""
+    missing = set(episodes)
+    try:
+        check_file(path, _MOST_BYTES)
+        with pq.ParquetFile(path) as file:
+            _check_schema(file.schema_arrow)
+            for batch in file.iter_batches(columns=["episode", *_NUMBERS]):
+                _check_numbers(np.stack([batch.column(name).to_numpy(False) for name in _NUMBERS]))
+                missing.difference_update(np.unique(batch.column("episode").to_numpy(False)).tolist())
+    except (OSError, ValueError, MemoryError, pa.ArrowException) as error:
+        raise _damaged(path, error) from None
+    if missing:
+        raise _damaged(path, ValueError(f"it has no trace of episode {min(missing)}"))
+
+
 def _check_schema(schema: pa.Schema) -> None:
     if not any(map(schema.equals, _SCHEMAS)):
         different = sorted(set(schema.names) ^ set(SCHEMA.names)) or ["types"]

@@ -20,6 +20,7 @@ from harness.drivers.policy_file import policy_files, read_card
 from harness.errors import UsageError
 from harness.evaluation.strategies import stage_id
 from harness.evaluation.tables import is_of_a_search, joined, read_csv
+from harness.evaluation.trace_file import check_traces
 from harness.road.scene.open_scene import OpenScene, open_scene
 
 
@@ -112,10 +113,12 @@ def _policy(folder: Path) -> dict[str, Any]:
 
 
 def _check_log(folder: RunFolder, stage: str, entry: Mapping[str, Any]) -> None:
-    """Raises UsageError unless the log of an arm is its own."""
+    """Raises UsageError unless the log of an arm is its own, and has a trace of each game that was played: a report is
+    refused before anything is measured."""
     file = folder.work(stage) / PLAYED
     played = read_csv(file)
     _check_rows(file, entry, played["arm"], played["seed"])
+    check_traces(folder.traces(stage), played.loc[played["error"] == "", "episode"])
 
 
 def _gathered(folder: RunFolder, manifest: Mapping[str, Any], kind: str, table: str) -> Iterator[pd.DataFrame]:
