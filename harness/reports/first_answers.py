@@ -162,7 +162,7 @@ def _retrained(focus: Focus | None, personas: Sequence[str], tables: RunTables) 
         yield _retrained_against(persona, tables)
     if others := asked[MOST_PERSONAS:]:
         mended = sum(answer(tables, "RQ2", each).label == YES for each in others)
-        yield f"Against {len(others)} more: yes for {mended}."
+        yield f"Against {len(others)} more: yes for {mended or 'none'}."
 
 
 def _retrained_against(persona: str, tables: RunTables) -> str:
