@@ -126,7 +126,8 @@ class Bodies(NamedTuple):
         """These bodies (the players), followed by the `NEAREST` background vehicles, sorted by distance to the nearest
         player. A vehicle farther than `NOTICED_M` from every player is not present."""
         nearest, present = nearest_to_players(background, self)
-        added = (*(np.take_along_axis(each, nearest, 1) for each in background[:-1]), present)
+        games = np.arange(len(nearest))[:, None]
+        added = (*(each[games, nearest] for each in background[:-1]), present)
         return Bodies._make(np.concatenate(pair, axis=1) for pair in zip(self, added, strict=True))
 
 

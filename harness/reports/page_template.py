@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,7 @@ LIBRARIES = ("vendor/uPlot.iife.min.js", "vendor/dataTables.min.js")
 """Libraries that the page contains as they are published; their licences are beside them."""
 
 
+@cache
 def environment_of(folder: str, autoescape: bool = True) -> Environment:
     """The template environment of a folder of the package `harness`.
 
