@@ -2,7 +2,7 @@
 
 Episode k has the same initial state in every arm of every training seed. Where a driver of SUMO's draws random numbers,
 SUMO is reloaded for each game with a seed that depends on the episode only, because the games of one simulation share
-them. Games in which SUMO drives nothing, or only the car that follows the ego, are played side by side in one
+them. Games in which it draws none (it drives no player, and other vehicles are steady) are played side by side in one
 simulation; the bytes are the same.
 """
 
@@ -235,7 +235,7 @@ def plays_side_by_side(arm: SeatedArm) -> bool:
 
 def _for_games_together(arm: SeatedArm) -> SeatedArm | None:
     """The arm with drivers for games side by side; None if its drivers or SUMO's traffic prevent such games."""
-    drivers = None if arm.scene.has_background_traffic else side_by_side(arm.drivers, arm.scene.world.walks)
+    drivers = side_by_side(arm.drivers, arm.scene.world.walks) if arm.scene.has_steady_traffic else None
     return replace(arm, drivers=drivers) if drivers is not None else None
 
 

@@ -7,8 +7,8 @@ reference point from the body's centre to the front bumper.
 Removing a vehicle from SUMO's traffic and adding it again takes as long as ten of its steps. A vehicle that is only
 moved back to its start loses its route in SUMO. If SUMO drives no vehicle of a game, the lost route has no effect. In
 this case players stay in the traffic from game to game, and SUMO's driver models are disabled for them. SUMO then has
-the poses of the players, but not always their speeds. If SUMO drives no vehicle but one that follows the ego, it looks
-for the players' lanes along their routes only.
+the poses of the players, but not always their speeds. If SUMO drives only steady vehicles, such as one that follows the
+ego, it looks for the players' lanes along their routes only.
 """
 
 from __future__ import annotations
@@ -73,9 +73,9 @@ class LibsumoSimulation(Simulation):
     def __init__(self, games: SceneGames, sumo: LoadedSumo, number: int) -> None:
         """The games are the part of SUMO with this number."""
         self._scene, self._games, self._taken_over = games.scene, games.games, games.taken_over
-        self._recorded, self._alone = games.recorded, games.alone
+        self._recorded, self._steady = games.recorded, games.steady
         self._sumo, self._number, self._tiles = sumo, number, sumo.tiles[number]
-        self._move_options = _ON_ITS_ROUTE if self._alone else _ON_ANY_LANE
+        self._move_options = _ON_ITS_ROUTE if self._steady else _ON_ANY_LANE
         self._half_length = 0.5 * games.scene.world.length_m
         self._begin()
 
@@ -90,8 +90,9 @@ class LibsumoSimulation(Simulation):
         world, prefixes = self._scene.world, self._tiles.prefixes
         self._signals = Signals(prefixes, world.right_of_way.signal_links)
         self._speed_limits = SpeedLimits(prefixes) if self._scene.document.varies.speed_limit_share else None
-        self._players_only = [self._alone] * self._games  # whether SUMO drives no vehicle of the game
-        blocks = bool(self._scene.obstacles.each) and not (self._alone and self._scene.road_behind is NO_ROAD)
+        self._players_only = [self._steady] * self._games  # whether SUMO drives no vehicle of the game
+        others = self._scene.road_behind is not NO_ROAD or self._scene.has_background_traffic
+        blocks = bool(self._scene.obstacles.each) and (others or not self._steady)
         self._standing = StandingVehicles(self._scene, prefixes, self._traffic) if blocks else None
         fastest_mps = float(world.actuators.max_speed_mps.max())
         self._background = BackgroundTraffic(
@@ -110,7 +111,7 @@ class LibsumoSimulation(Simulation):
             follower = self._scene.road_behind.follower(start, length_m[EGO])
             if follower is not None:
                 departures = with_follower(departures, follower, start, length_m)
-            before, players_only = self._players_only[game], self._alone and not departures
+            before, players_only = self._players_only[game], self._steady and not departures
             self._players_only[game] = players_only
             staying = self._present[game] & start.present & before & players_only
             for player in np.flatnonzero(self._present[game] & ~staying).tolist():

@@ -22,22 +22,23 @@ class SceneGames:
     """Whether every background vehicle is read in every step, near a player or not."""
 
     @property
-    def alone(self) -> bool:
-        """Whether SUMO drives no vehicle, but one that may follow the ego."""
-        return all(self.taken_over) and not self.scene.has_background_traffic
+    def steady(self) -> bool:
+        """Whether SUMO draws no random number and changes no lane: it drives no player, and other vehicles are steady,
+        such as the one that may follow the ego."""
+        return all(self.taken_over) and self.scene.has_steady_traffic
 
     @property
     def in_one_place(self) -> bool:
         """Whether the tiles of an assessment lie on each other, so that what SUMO computes in a game is the same, to
         the last bit, in every tile. It looks for lanes along the routes of a car then, which are in its tile."""
-        return self.recorded and self.alone
+        return self.recorded and self.steady
 
     @property
     def options(self) -> list[str]:
         """SUMO's options, besides the names of files and the seed."""
         # SUMO 1.28 may crash (SIGSEGV) if a placed car leaves a junction's lanes and lane changes take time: they take
         # time only if SUMO drives a vehicle that changes lanes.
-        duration_s = 0.0 if self.alone else LANE_CHANGE_S
+        duration_s = 0.0 if self.steady else LANE_CHANGE_S
         lateral = ["--lanechange.duration", str(duration_s)]
         if self._needs_sublanes():
             lateral = ["--lateral-resolution", str(_LATERAL_RESOLUTION_M)]  # SUMO accepts one of the two options

@@ -238,3 +238,28 @@ def test_additional_file__gives_types_and_bus_stops(write: Write, tmp_path: Path
     more.write_text("<additional><tlLogic/></additional>", encoding="utf-8")
     with pytest.raises(UsageError, match=r"more.add.xml: tlLogic: is not understood here"):
         read_route_file(path, more)
+
+
+STEADY = 'sigma="0" speedDev="0" lcStrategic="-1" lcCooperative="0" lcSpeedGain="0" lcKeepRight="0" maxSpeed="9"'
+WALKER = '<person id="p" depart="0"><walk edges="one"/></person>'
+
+
+@pytest.mark.parametrize(
+    ("of_type", "of_vehicle", "more", "steady"),
+    [
+        (STEADY, "", "", True),
+        (STEADY.replace('sigma="0"', 'sigma="0.5"'), "", "", False),
+        (STEADY.replace('speedDev="0"', ""), "", "", False),
+        (f'{STEADY} speedFactor="normc(1,0.1)"', "", "", False),
+        (f'{STEADY} carFollowModel="EIDM"', "", "", False),
+        (STEADY, 'departPos="random"', "", False),
+        (STEADY, "", WALKER, False),
+    ],
+)
+def test_traffic__is_steady_if_nothing_about_it_is_random(
+    of_type: str, of_vehicle: str, more: str, steady: bool, write: Write
+) -> None:
+    vehicle = f'<vehicle id="v" type="slow" depart="0" {of_vehicle}><route edges="one"/></vehicle>{more}'
+    routes = read_route_file(write(f'<vType id="slow" {of_type}/>{vehicle}'))
+    assert routes.is_steady(set()) == steady
+    assert routes.is_steady({"v", "p"})

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from math import isnan
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -24,6 +25,13 @@ from harness.road.demand.stops import stop_in
 from harness.road.xml.xml_file import number_in, number_of, required
 
 _MOST_EDGES = 10_000
+_STEADY = {
+    **{"sigma": 0.0, "speedDev": 0.0},
+    **{"lcStrategic": -1.0, "lcCooperative": 0.0, "lcSpeedGain": 0.0, "lcKeepRight": 0.0},
+}
+"""A vType with these numbers stays in its lane and draws no random number, if it has no other attributes but those of
+the next line."""
+_OF_BODY = "id vClass length width height minGap maxSpeed accel decel emergencyDecel speedFactor tau color guiShape"
 # the range of each number: above the first value, up to the second
 _RANGES = {
     "length": (0.0, 100.0),
@@ -160,7 +168,14 @@ def _vehicle_type(path: Path, element: ElementTree.Element) -> VehicleType:
         desired_speed_mps=ranged(path, element, "desiredMaxSpeed", desired_mps),
         lane_changes=element.get("laneChangeModel", ""),
         vehicle_class=vehicle_class,
+        steady=_is_steady(element),
     )
+
+
+def _is_steady(element: ElementTree.Element) -> bool:
+    law = {name: number_of(element.get(name, "")) for name in _STEADY}
+    others = element.attrib.keys() - _STEADY.keys() - {*_OF_BODY.split()}
+    return law == _STEADY and not others and not len(element) and not isnan(number_of(element.get("speedFactor", "1")))
 
 
 def _mix(

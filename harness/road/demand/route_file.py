@@ -66,6 +66,8 @@ class VehicleType:
     lane_changes: str = ""
     """The vType's laneChangeModel; empty: SUMO's default."""
     vehicle_class: str = "passenger"
+    steady: bool = False
+    """Whether its vehicles stay in their lane and draw none of SUMO's random numbers."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -166,6 +168,18 @@ class RouteFile:
     def names(self) -> set[str]:
         """Those of all vehicles, persons and flows."""
         return {*self.vehicles, *(flow.departure.name for flow in self.flows)}
+
+    def is_steady(self, excluded: set[str]) -> bool:
+        """Whether the traffic without the `excluded` vehicles draws none of SUMO's random numbers and stays in its
+        lanes: no person walks, and all vehicles have steady types and departures."""
+        others = [*self.vehicles.values(), *(flow.departure for flow in self.flows)]
+        return all(self._steady(each) for each in others if each.name not in excluded)
+
+    def _steady(self, departure: Departure) -> bool:
+        if departure.on_foot or any("random" in each for each in (departure.lane, departure.position, departure.speed)):
+            return False
+        mix = self.mixes.get(departure.vehicle_type)
+        return all(self.types[name].steady for name in (mix.types if mix else (departure.vehicle_type,)))
 
     def departures(
         self,

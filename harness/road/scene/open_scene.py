@@ -65,6 +65,11 @@ class OpenScene:
         return bool(self.routes.names - {*self.document.vehicles})
 
     @cached_property
+    def has_steady_traffic(self) -> bool:
+        """Whether the background traffic, if any, draws none of SUMO's random numbers and stays in its lanes."""
+        return self.routes.is_steady({*self.document.vehicles})
+
+    @cached_property
     def warm_up(self) -> tuple[Snapshot, ...]:
         """The background traffic with which games begin. Raises SimulationError if SUMO fails."""
         return snapshots(self.document, self.routes, self.net_file)
