@@ -99,7 +99,7 @@ class Subject:
     persona: str
     seed: int
 
-    def check(self, arm: str, value: float = np.nan, limit: float = np.nan, games: int = 0, detail: str = "") -> Check:
+    def check(self, arm: str, value: float = np.nan, limit: float = np.nan, games: int = 0) -> Check:
         """The check of what was measured in an arm; by default nothing was."""
         return Check(
             bound=self.bound,
@@ -110,7 +110,6 @@ class Subject:
             limit=limit,
             allowed=self.allowed,
             games=games,
-            detail=detail,
         )
 
 
