@@ -63,7 +63,6 @@ class OpenCampaign(CampaignPlayers):
 
     @property
     def tunable(self) -> bool:
-        """Whether the ego is external and has tunable parameters."""
         return _is_tunable(self.ego_driver)
 
     @property
@@ -73,7 +72,6 @@ class OpenCampaign(CampaignPlayers):
         return plan(self.document, names, self.tunable, traits_of(self.personas, self.baseline))
 
     def hash_of(self, path: Path) -> str:
-        """SHA-256 of one of those files."""
         return self.hashes[_relative(self.file, path)]
 
     def hashes_of(self, scene: OpenScene) -> dict[str, str]:

@@ -31,7 +31,6 @@ class People:
 
 
 def people_of(scene: Path) -> list[People]:
-    """The shipped people of a scene."""
     seeds: dict[tuple[str, bool], list[int]] = {}
     for person, together, seed, _ in _policies(scene):
         seeds.setdefault((person, together), []).append(seed)

@@ -124,7 +124,6 @@ class Goals:
 
     @classmethod
     def recorded(cls, entry: Mapping[str, Any]) -> Goals:
-        """The goals that an entry of a manifest records."""
         return cls(**{name: entry[name] for name in cls.__dataclass_fields__ if name in entry})
 
     def record(self) -> dict[str, int]:
@@ -237,5 +236,4 @@ class TraitQuestion:
 
     @property
     def arms(self) -> tuple[str, ...]:
-        """The arms that it compares."""
         return tuple(filter(None, (self.arm, self.without_arm, self.baseline_arm, self.alone_arm)))

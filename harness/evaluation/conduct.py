@@ -8,7 +8,7 @@ import numpy as np
 
 from harness.evaluation.column import SHARE
 from harness.evaluation.metrics import Drive, finite, metric
-from harness.evaluation.rule_book.course import Stretch, nearest_lane_m, runs
+from harness.evaluation.rule_book.course import Stretch, runs
 from harness.evaluation.rule_book.thresholds import LANE_CHANGE_M
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.meetings import STANDING_MPS
@@ -26,9 +26,7 @@ _REVERSAL_RAD = np.radians(3.0) / _WHEEL_RATIO
 
 def _in_lane(drive: Drive) -> tuple[FloatArray, FloatArray]:
     """[N] the centre of the nearest lane in each step, and the place of the player, both from the route's line."""
-    routes, place_m = drive.game.quantities.world.road.routes, drive.of("lateral_offset_m")
-    rows = drive.game.while_driving(routes.rows(drive.game.quantities.state.station_m), drive.player)
-    return nearest_lane_m(routes.lane_offset_m[rows], place_m), place_m
+    return drive.game.while_driving(drive.game.lane_centre_m, drive.player), drive.of("lateral_offset_m")
 
 
 def lane_changes(drive: Drive) -> list[Stretch]:

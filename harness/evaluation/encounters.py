@@ -66,7 +66,6 @@ class _Search:
         return np.where(self.drove, self.q.state.station_m[:, self.player] + half_m, np.nan)
 
     def encounters(self) -> Iterator[Encounter]:
-        """The encounters in every zone that the player enters."""
         conflicts, q, length_m = self._tables.conflicts, self.q, float(self.q.world.length_m[self.player])
         speed_mps, offset_m = q.state.speed_mps[:, self.player], q.lateral_offset_m[:, self.player]
         there = Places(*places(tuple(q.bodies), tuple(self._tables.streams)))

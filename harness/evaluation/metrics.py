@@ -32,12 +32,10 @@ class Drive:
 
     @property
     def outcome(self) -> Outcome:
-        """How its game ended."""
         return self.game.outcomes[self.player]
 
     @property
     def step_s(self) -> float:
-        """Length of a step."""
         return self.game.world.step_s
 
     @property
@@ -47,11 +45,9 @@ class Drive:
 
     @property
     def payoff(self) -> FloatArray:
-        """Its payoff of each step."""
         return self.game.while_driving(self.game.payoff, self.player)
 
     def flags(self, column: str) -> BoolArray | None:
-        """`RecordedGame.flags` of the player."""
         flags = self.game.flags(column)
         return None if flags is None else self.game.while_driving(flags, self.player)
 
@@ -62,7 +58,6 @@ class Drive:
 
     @property
     def encounters(self) -> tuple[Encounter, ...]:
-        """Its encounters at junctions."""
         return self.game.encounters[self.player]
 
 

@@ -9,10 +9,10 @@ trainings like them. A planned test stays in its family whatever comes out: one 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import Enum
 
-from harness.evaluation.competence import Question, ResearchQuestion
+from harness.evaluation.competence import Question
 
 PRIMARY = "failure"
 """The metric of primary tests. Tests of other metrics are secondary: they are not corrected, and are no answers."""
@@ -30,40 +30,15 @@ class About(str, Enum):
     """Players of other training seeds too."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class PlannedTest:
-    """A primary test: of one trained pair, or over the training seeds of a campaign."""
-
-    asked: tuple[Question, ...]
-    """The same question for each of its training seeds."""
-
-    @property
-    def question(self) -> ResearchQuestion:
-        return self.asked[0].question
-
-    @property
-    def persona(self) -> str:
-        return self.asked[0].persona
-
-    @property
-    def seeds(self) -> tuple[int, ...]:
-        return tuple(each.seed for each in self.asked)
+PlannedTest = tuple[Question, ...]
+"""A primary test, of one trained pair or over the training seeds: the same question for each of its seeds."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Family:
-    """The planned tests that are corrected together."""
-
-    about: About
-    tests: tuple[PlannedTest, ...]
-
-
-def families(questions: Sequence[Question]) -> tuple[Family, ...]:
-    """The families of the planned questions, that over trainings last; it is left out where no test is planned."""
+def families(questions: Sequence[Question]) -> dict[About, list[PlannedTest]]:
+    """The tests that are corrected together; a family without any is left out."""
     of_seeds: dict[Question, list[Question]] = {}
     for each in questions:
         of_seeds.setdefault(replace(each, seed=0, unlike_people=""), []).append(each)
-    pairs = tuple(PlannedTest(asked=(each,)) for asked in of_seeds.values() for each in asked)
-    over = tuple(PlannedTest(asked=tuple(asked)) for asked in of_seeds.values() if len(asked) >= LEAST_TRAININGS)
-    planned = {About.TRAINED_PAIR: pairs, About.TRAININGS: over}
-    return tuple(Family(about=about, tests=tests) for about, tests in planned.items() if tests)
+    pairs: list[PlannedTest] = [(each,) for asked in of_seeds.values() for each in asked]
+    over = [tuple(asked) for asked in of_seeds.values() if len(asked) >= LEAST_TRAININGS]
+    return {about: tests for about, tests in ((About.TRAINED_PAIR, pairs), (About.TRAININGS, over)) if tests}

@@ -40,8 +40,6 @@ _ODDS = (1.8, 7.2)
 
 
 class Games(Enum):
-    """The games in which a figure is measured."""
-
     ALONE = "alone on the road"
     ALL = "all"
 
@@ -63,7 +61,6 @@ class HumanFigure:
 
     @property
     def name(self) -> str:
-        """Its name in the table."""
         return self.metric if self.at_most is None else f"{self.metric}_at_most_{self.at_most:g}"
 
 

@@ -51,7 +51,6 @@ class RecordedGame:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """[B]"""
         others = set(self.trace["player"]) - {*self.world.roles, *self.obstacles}
         return (*self.world.roles, *sorted(others), *self.obstacles)
 
@@ -75,7 +74,6 @@ class RecordedGame:
         return Box(*(float(getattr(self.bodies, name)[step, body]) for name in Box._fields))
 
     def velocity_mps(self, step: int, body: int) -> FloatArray:
-        """[2] a body's velocity."""
         heading = self.bodies.heading_rad[step, body]
         return np.array([np.cos(heading), np.sin(heading)]) * self.bodies.speed_mps[step, body]
 
@@ -141,6 +139,12 @@ class RecordedGame:
         return Quantities(self.world, state, bodies, state.station_m - before_m, offset_m, gained_mps2)
 
     @cached_property
+    def lane_centre_m(self) -> FloatArray:
+        """[T, P] the centre of the lane nearest to each player, to the left of its route."""
+        routes, state = self.world.road.routes, self.quantities.state
+        return nearest_lane_m(routes.lane_offset_m[routes.rows(state.station_m)], self.quantities.lateral_offset_m)
+
+    @cached_property
     def _considered(self) -> BoolArray:
         """[T, B]"""
         players, result = len(self.world.roles), np.ones(self.bodies.present.shape, dtype=bool)
@@ -167,7 +171,6 @@ class RecordedGame:
 
     @cached_property
     def _places(self) -> tuple[IntArray, IntArray]:
-        """The step and the body of each row."""
         column = self.trace["player"].map({name: place for place, name in enumerate(self.names)})
         return self.trace["step"].to_numpy(dtype=np.int64), column.to_numpy(dtype=np.int64)
 
@@ -202,6 +205,13 @@ class RecordedGame:
 
 _PLAYERS = (*PlayersMotion._fields, "lapsed")
 _OUTCOMES = {outcome.word: outcome for outcome in Outcome}
+
+
+def nearest_lane_m(lanes_m: FloatArray, offset_m: FloatArray) -> FloatArray:
+    """[...] the centre of the lane nearest to each offset [...], of lanes with the centres [..., L] (NaN: none)."""
+    away_m = np.abs(lanes_m - offset_m[..., None])
+    nearest = np.where(np.isnan(away_m), np.inf, away_m).argmin(-1)
+    return np.take_along_axis(lanes_m, nearest[..., None], -1)[..., 0]
 
 
 @lru_cache(maxsize=1024)

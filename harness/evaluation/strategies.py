@@ -141,7 +141,6 @@ class Arm:
 
     @property
     def name(self) -> str:
-        """The arm's name in tables and stages."""
         pair = _pair_name(self.ego, self.non_ego)
         return pair if self.best_response_of is None else f"{pair}_{ROLES[self.best_response_of]}_response"
 

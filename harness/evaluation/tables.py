@@ -102,7 +102,6 @@ def write_csv(frame: pd.DataFrame, path: Path) -> None:
 
 
 def exact(value: object) -> str:
-    """The text of a value in a table."""
     if isinstance(value, bool):
         return str(value).lower()
     return value if isinstance(value, str) else "" if pd.isna(value) else repr(value)

@@ -37,7 +37,6 @@ class Line:
 
     @property
     def text(self) -> str:
-        """The line as the terminal and CI show it."""
         return f"{PASS if self.passed else FAIL}  {self.title}: {self.sentence}".replace(NO_SPACE, " ")
 
 
@@ -82,7 +81,6 @@ def _titles(lines: Sequence[Line], bounds: Mapping[str, int]) -> Iterator[str]:
 
 
 def headline(checks: Sequence[Check]) -> str:
-    """The verdict on all bounds."""
     broken = sum(not check.passed for check in checks)
     if not broken:
         return f"{PASS}: the ego keeps every bound of the campaign"

@@ -43,7 +43,6 @@ def attribution_section(tables: RunTables, links: GameLinks) -> list[dict[str, A
 
 
 def trait_words(trait: str) -> str:
-    """A trait in a table or a sentence."""
     return "all traits" if trait == ALL_TRAITS else TRAITS[trait].words
 
 

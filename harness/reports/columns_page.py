@@ -10,7 +10,6 @@ _ORDER = ("episodes", "causes", "manoeuvres", "summary", "comparisons")
 
 
 def columns_page() -> str:
-    """The page `docs/columns.md`."""
     names = [*_ORDER, *(name for name in TABLES if name not in (*_ORDER, "played"))]
     template = environment_of("reports", autoescape=False).get_template("columns.md.jinja")
     return (

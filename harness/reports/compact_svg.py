@@ -7,11 +7,10 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TypeAlias
+from collections.abc import Iterator, Mapping, Sequence
+from xml.etree import ElementTree
+from xml.sax.saxutils import escape
 
-_TOKEN = re.compile(r"<!--.*?-->|<[^>]*>|[^<]+", re.DOTALL)
-_ATTRIBUTE = re.compile(r'\s([\w:-]+)="([^"]*)"')
 _ID = re.compile(r' id="([^"]+)"')
 _REFERENCE = re.compile(r'href="#([^"]+)"|url\(#([^)]+)\)')
 _COMMAND = re.compile(r"([A-Za-z])([^A-Za-z]*)")
@@ -19,80 +18,56 @@ _LAST_NUMBER = re.compile(r"[\d.]*$")
 _NO_TURN = re.compile(r"rotate\(-?0(?:\.0*)?[ ,][^)]*\)")
 _DECIMALS, _DECIMALS_OF_MANY, _MANY = 2, 1, 20
 """Of a coordinate (1/72 inch), and of one of a path of more than so many points."""
-_Token: TypeAlias = tuple[str, dict[str, str], str]
-"""The name of a tag, its attributes and its end; or nothing, nothing and a text or the end of an element."""
+_WITH_TEXT = ("text", "tspan", "title")
 _COUNTS = {"M": 2, "L": 2, "C": 6, "Q": 4, "Z": 0}
 """The commands of a path that matplotlib writes, with how many numbers follow each."""
 
 
 def compact(drawing: str, name: str) -> str:
-    """What is inside an SVG element, in fewer characters. `name` is the class of the element and begins its ids."""
+    """What is inside an SVG element, and its end, in fewer characters. `name` is the class of the element and begins
+    its ids."""
     there = {*_ID.findall(drawing)}
     used = dict.fromkeys(one or other for one, other in _REFERENCE.findall(drawing))
     ids = {found: f"{name}-{place}" for place, found in enumerate(each for each in used if each in there)}
-    tokens = _joined_groups(_kept(drawing, ids))
-    counts = Counter(attributes["style"] for _, attributes, _ in tokens if "style" in attributes)
+    root = ElementTree.fromstring(f"<svg>{drawing}")
+    _simplify(root, ids)
+    counts = Counter(each.attrib["style"] for each in root.iter() if "style" in each.attrib)
     shared = [style for style, count in counts.items() if count > 1]
     classes = {style: _letters(place) for place, style in enumerate(shared)}
     rules = "".join(f".{name} .{each}{{{_with_ids(style, ids)}}}" for style, each in classes.items())
-    texts = [_written(tag, attributes, end, ids, classes) for tag, attributes, end in tokens]
-    return (f"<style>{rules}</style>" if rules else "") + "".join(texts)
+    return (f"<style>{rules}</style>" if rules else "") + "".join(_inside(root, ids, classes)) + "</svg>"
 
 
-def _kept(drawing: str, ids: Mapping[str, str]) -> Iterator[_Token]:
-    """What draws something."""
-    open_tags: list[tuple[str, bool]] = []
-    for token in _TOKEN.findall(drawing):
-        if token.startswith("<!--"):
-            continue
-        if not token.startswith("<"):
-            if token.strip() or (open_tags and open_tags[-1][0] in ("text", "tspan", "title")):
-                yield "", {}, token
-        elif token.startswith("</"):
-            if open_tags:
-                tag, is_kept = open_tags.pop()
-                if not is_kept:
-                    continue
-            yield "", {}, token
-        else:
-            tag = token[1:].split(None, 1)[0].rstrip("/>")
-            attributes = _attributes(tag, token, ids)
-            is_alone = token.endswith("/>")
-            is_kept = tag != "g" or bool(attributes) or is_alone
-            if not is_alone:
-                open_tags.append((tag, is_kept))
-            if is_kept:
-                yield tag, attributes, "/>" if is_alone else ">"
+def _simplify(element: ElementTree.Element, ids: Mapping[str, str]) -> None:
+    """Leave out what draws nothing in an element: groups that say nothing, and those that repeat the one before."""
+    found: list[ElementTree.Element] = []
+    for child in element:
+        _simplify_attributes(child, ids)
+        _simplify(child, ids)
+        for each in child if _is_group(child) and not child.attrib else [child]:
+            before = found[-1] if found and _is_group(found[-1]) else None
+            if before is not None and _is_group(each) and each.attrib == before.attrib and "id" not in each.attrib:
+                before.extend(each)
+            else:
+                found.append(each)
+    element[:] = found
 
 
-def _joined_groups(tokens: Iterable[_Token]) -> list[_Token]:
-    """The tokens with one group in the place of two with the same attributes, one after the other."""
-    found: list[_Token] = []
-    open_tags: list[dict[str, str]] = []
-    closed: dict[str, str] | None = None  # of the group that the last token has ended
-    for tag, attributes, end in tokens:
-        if tag == "g" and end == ">" and attributes == closed and "id" not in attributes:
-            found.pop()
-            open_tags.append(attributes)
-            closed = None
-            continue
-        closed = None
-        if tag and end == ">":
-            open_tags.append(attributes)
-        elif not tag and end.startswith("</") and open_tags:
-            attributes = open_tags.pop()
-            closed = attributes if end == "</g>" else None
-            attributes = {}
-        found.append((tag, attributes, end))
-    return found
+def _is_group(element: ElementTree.Element) -> bool:
+    return element.tag == "g" and not _is_alone(element)
 
 
-def _attributes(tag: str, token: str, ids: Mapping[str, str]) -> dict[str, str]:
-    """The attributes of a tag that say something."""
-    found = dict(_ATTRIBUTE.findall(token))
+def _is_alone(element: ElementTree.Element) -> bool:
+    """Whether nothing is inside an element, not even blanks."""
+    return not len(element) and element.text is None
+
+
+def _simplify_attributes(element: ElementTree.Element, ids: Mapping[str, str]) -> None:
+    """Leave out the attributes that say nothing, and write the others briefly."""
+    found = element.attrib
     if found.get("id", "") not in ids:
         found.pop("id", None)
-    if "clip-path" in found and tag != "g":
+    if "clip-path" in found and element.tag != "g":
         found["style"] = ";".join(filter(None, (found.get("style", ""), f"clip-path:{found.pop('clip-path')}")))
     if "style" in found:
         found["style"] = ";".join(re.sub(r"\s*:\s*", ":", part.strip()) for part in found["style"].split(";"))
@@ -100,26 +75,25 @@ def _attributes(tag: str, token: str, ids: Mapping[str, str]) -> dict[str, str]:
         del found["transform"]
     if "d" in found:
         found["d"] = compact_path(found["d"])
-    return found
 
 
-def _written(
-    tag: str, attributes: Mapping[str, str], end: str, ids: Mapping[str, str], classes: Mapping[str, str]
-) -> str:
-    if not tag:
-        return end
-    said = dict(attributes)
-    if "id" in said:
-        said["id"] = ids[said["id"]]
-    if said.get("style") in classes:
-        said = {"class": classes[said.pop("style")], **said}
-    text = "".join(f' {key}="{value}"' for key, value in said.items())
-    return f"<{tag}{_with_ids(text, ids)}{end}"
+def _inside(element: ElementTree.Element, ids: Mapping[str, str], classes: Mapping[str, str]) -> Iterator[str]:
+    """What is inside an element, as text."""
+    has_text = element.tag in _WITH_TEXT
+    yield escape(element.text or "") if has_text else ""
+    for child in element:
+        said = dict(child.attrib)
+        if "id" in said:
+            said["id"] = ids[said["id"]]
+        if said.get("style") in classes:
+            said = {"class": classes[said.pop("style")], **said}
+        text = "".join(f' {key}="{escape(value)}"' for key, value in said.items())
+        yield f"<{child.tag}{_with_ids(text, ids)}"
+        yield from ["/>"] if _is_alone(child) else [">", *_inside(child, ids, classes), f"</{child.tag}>"]
+        yield escape(child.tail or "") if has_text else ""
 
 
 def _with_ids(text: str, ids: Mapping[str, str]) -> str:
-    """A text with the new ids in its references."""
-
     def renamed(reference: re.Match[str]) -> str:
         own = reference[1] or reference[2]
         return reference[0].replace(own, ids.get(own, own))

@@ -76,7 +76,6 @@ class Transition:
 
     @property
     def headline(self) -> str:
-        """The result in one line."""
         return headline(self.rows) if self.same_starts else NO_PAIRS
 
     @property
@@ -117,7 +116,6 @@ class Comparison:
 
 
 def headline(rows: Sequence[ComparedRow]) -> str:
-    """The result of a comparison of two runs in one line."""
     if not rows:
         return NOTHING_IN_COMMON
     worse, better = (sum(row.verdict == verdict for row in rows) for verdict in (WORSE, BETTER))

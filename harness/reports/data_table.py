@@ -24,8 +24,6 @@ _KINDS = {TEXT: "text", FLAG: "flag", COUNT: "count", MAYBE: "count"}
 
 
 class Cell(NamedTuple):
-    """A cell of the page."""
-
     text: str
     exact: str | None
     """The text of the CSV file's cell, None where it is the same (text columns)."""

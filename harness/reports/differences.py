@@ -71,8 +71,7 @@ def _speed_finding(row: Row, significance: float | None) -> str:
 
 def faster_by(row: Row) -> float:
     """By how much the second arm is faster, in m/s; negative: slower. `mean_difference` of RQ1 counts slower arms."""
-    difference: float = row["mean_difference"]
-    return -difference if row["question"] == "RQ1" else difference
+    return -row["mean_difference"] if row["question"] == "RQ1" else row["mean_difference"]
 
 
 def two_sided_p(row: Row) -> float:

@@ -24,8 +24,8 @@ from harness.reports.verdict_wording import LABELS, NOT_ANSWERED, YES, Answer, a
 
 MOST_PERSONAS = 3
 """Personas for which an answer has a line of its own; the verdicts have the others."""
-_VERDICTS = {"from_conflict": "from the conflict on", "from_start": "from the start"}
-"""The verdicts of preventability.csv on a failure, in words."""
+_VERDICTS = ("from_conflict", "from_start")
+"""The verdicts of preventability.csv that the first screen has."""
 
 
 @dataclass(frozen=True, kw_only=True)

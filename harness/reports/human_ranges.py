@@ -51,7 +51,6 @@ class HumanRow:
 
 
 def comparable(realism: pd.DataFrame) -> pd.DataFrame:
-    """The rows that could be compared."""
     return realism[realism["realistic"] != NOT_COMPARABLE]
 
 
@@ -91,7 +90,6 @@ def _clause(row: Mapping[Any, Any]) -> str:
 
 
 def human_rows(realism: pd.DataFrame) -> list[HumanRow]:
-    """The comparable rows in words, player by player."""
     return list(map(_in_words, _named(comparable(realism), realism).to_dict("records")))
 
 

@@ -143,7 +143,6 @@ def _cells(run: IndexedRun) -> list[str]:
 
 
 def state_words(run: IndexedRun) -> str:
-    """What the run has come to, in words."""
     match run.state:
         case "unreadable":
             return f"can't be read: {run.problem}"

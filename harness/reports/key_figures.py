@@ -6,7 +6,7 @@ An ego without failures may still come too close in most games, or fail against 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -59,23 +59,26 @@ def _causes(persona: str, tables: RunTables) -> Iterator[KeyFigure]:
 
 
 def _preventable(persona: str, tables: RunTables) -> Iterator[KeyFigure]:
-    verdicts = {
-        "from_conflict": "from the conflict on",
-        "moving_over": "if the other moves on into its line",
-        "from_start": "from the start",
-    }
-    found = {made: prevented_clauses(arm, verdicts, tables) for _, made, arm in egos_of(persona, tables)}
+    found = {made: prevented_clauses(arm, PREVENTED, tables) for _, made, arm in egos_of(persona, tables)}
     lines = [f"{made}: {', '.join(clauses)}" for made, clauses in found.items() if clauses]
     yield KeyFigure(title="Preventable by the careful and competent driver of UN R157", lines=lines)
 
 
-def prevented_clauses(arm: str, verdicts: Mapping[str, str], tables: RunTables) -> list[str]:
+PREVENTED = {
+    "from_conflict": "from the conflict on",
+    "moving_over": "if the other moves on into its line",
+    "from_start": "from the start",
+}
+"""The verdicts of preventability.csv on a failure, in words."""
+
+
+def prevented_clauses(arm: str, verdicts: Iterable[str], tables: RunTables) -> list[str]:
     """How many failures of an arm the driver of the regulation prevents, such as "3 of 7 from the start", for each of
-    the verdicts of preventability.csv, in words, that a failure has."""
+    these verdicts that a failure has."""
     rows, clauses = tables.prevented_in(arm), []
-    for verdict, words in verdicts.items():
+    for verdict in verdicts:
         prevented, judged = (sum(row[f"{verdict}_{count}"] for row in rows) for count in ("prevented", "judged"))
-        clauses += [f"{prevented} of {judged} {words}"] if judged else []
+        clauses += [f"{prevented} of {judged} {PREVENTED[verdict]}"] if judged else []
     return clauses
 
 

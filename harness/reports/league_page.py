@@ -70,7 +70,6 @@ def not_answered(table: pd.DataFrame) -> list[tuple[str, str]]:
 
 
 def league_terminal(table: pd.DataFrame) -> Table:
-    """The twelve worst rows for the terminal."""
     shown = text_table(HEADINGS[:5])
     for row in table.head(12).to_dict("records"):
         style = "dim" if row["reason"] else "red" if row["failure_rate"] > _MUCH else None

@@ -128,7 +128,6 @@ def _learning_figure(
 
 
 def stopped(stage: Mapping[str, Any]) -> str:
-    """Why a training stopped."""
     reason = stage.get("stopped")
     text = {"converged": "early: converged", "budget": "budget used", None: MISSING}.get(reason, str(reason))
     if reason == DID_NOT_LEARN and stage.get("played"):

@@ -57,10 +57,8 @@ def _told(row: Any) -> str:
     return f"{row.deed}, {row.time_left_s:.1f} s before the end" if row.other else str(row.deed)
 
 
-def marks_of(manoeuvres: pd.DataFrame | None) -> Mapping[str, Sequence[Mapping[str, Any]]]:
+def marks_of(manoeuvres: pd.DataFrame) -> Mapping[str, Sequence[Mapping[str, Any]]]:
     """The marks on the time axis of each game, by the game's `key`."""
-    if manoeuvres is None:
-        return {}
     marks: dict[str, list[Mapping[str, Any]]] = {}
     for row in manoeuvres.sort_values("time_s", kind="stable").to_dict("records"):
         marks.setdefault(key(row["arm"], row["seed"], row["episode"]), []).append(

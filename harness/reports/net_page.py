@@ -30,7 +30,6 @@ class DrawnShape:
 
     @property
     def place(self) -> tuple[float, float]:
-        """The place of the label for SVG."""
         x, y = self.points[len(self.points) // 2] if len(self.points) != 2 else self.points.mean(0)
         return round(float(x), 2), round(-float(y), 2)
 
@@ -48,7 +47,6 @@ class Drawing:
 
     @property
     def view(self) -> str:
-        """The part of the plane that is seen at first, for SVG."""
         points = np.concatenate([shape.points for shape in self.opens_on or (*self.shapes, *self.marks)])
         (left, low), (right, high) = points.min(0) - _MARGIN_M, points.max(0) + _MARGIN_M
         return f"{left:.2f} {-high:.2f} {right - left:.2f} {high - low:.2f}"

@@ -91,7 +91,7 @@ def render_page(
         embedded=texts,
         left=len(tables.played) - len(texts),
         recorded=recorded_document(scene, texts.values()),
-        pairs=None if tables.manoeuvres is None else pairs,
+        pairs=pairs,
         pair_arms=arms,
         curves=learning(tables),
         searches=searches(tables.reconfiguration),
@@ -116,7 +116,6 @@ def render_page(
 
 
 def _header(tables: RunTables) -> dict[str, Any]:
-    """What the run is: its campaign, command and facts."""
     manifest = tables.manifest
     return {
         "command": command_of(manifest),

@@ -37,12 +37,10 @@ def facts(manifest: Mapping[str, Any], seeds: Sequence[int], personas: int) -> l
 
 
 def scene_of(manifest: Mapping[str, Any]) -> str:
-    """The name of the scene of a run."""
     return str(manifest.get("campaign", {}).get("scene", "")).rstrip("/").rsplit("/", 1)[-1]
 
 
 def ego_of(manifest: Mapping[str, Any]) -> str:
-    """What drives the ego of a run."""
     ego = str(manifest.get("campaign", {}).get("ego", {}).get("driver", ""))
     return str((manifest.get("ego_driver") or {}).get("in_words") or ego)
 
@@ -67,13 +65,11 @@ def made_by(manifest: Mapping[str, Any]) -> list[str]:
 
 
 def command_of(manifest: Mapping[str, Any]) -> str:
-    """The command that makes the run."""
     file = manifest.get("file") or f"{manifest.get('name', 'campaign')}.toml"
     return f"harness campaign {shlex.quote(str(file))}" + (" --quick" if manifest.get("quick") else "")
 
 
 def rounds(stages: Iterable[Mapping[str, Any]]) -> str:
-    """The rounds of an ego that is not trained."""
     if any(stage.get("kind") == "reconfiguration" for stage in stages):
         return "0, 1 and 2: this ego is not trained, but its parameters are tuned"
     return "0 and 1: this ego has nothing to train or to tune"
@@ -122,6 +118,5 @@ def _text(versions: Sequence[Mapping[str, str]], program: str) -> str:
 
 
 def warn(sentences: Sequence[str], console: Console) -> None:
-    """Print warnings."""
     for sentence in sentences:
         console.print(sentence, style="yellow", highlight=False, markup=False, soft_wrap=True)

@@ -92,6 +92,7 @@ class RunTables:
     """Empty: the ego has no perception errors."""
     populations: pd.DataFrame = field(default_factory=_empty("populations"))
     causes: pd.DataFrame = field(default_factory=_empty("causes"))
+    conduct: pd.DataFrame = field(default_factory=_empty("conduct"))
     starts: pd.DataFrame = field(default_factory=pd.DataFrame)
     """The quantities that differ between the starts (`start_space.start_quantities`), by episode."""
     boundaries: Sequence[Boundary] = ()
@@ -104,8 +105,7 @@ class RunTables:
     takeovers: pd.DataFrame = field(default_factory=_empty("takeovers"))
     preventability: pd.DataFrame = field(default_factory=_empty("preventability"))
     """Empty: no failure was judged by reference drivers."""
-    manoeuvres: pd.DataFrame | None = None
-    """None: the report has no section on manoeuvres."""
+    manoeuvres: pd.DataFrame = field(default_factory=_empty("manoeuvres"))
     game: GameFindings | None = None
     """None: the report has no section on the game."""
     non_ego_drives: bool = True
@@ -119,19 +119,14 @@ class RunTables:
 
     @property
     def campaign(self) -> Mapping[str, Any]:
-        """The campaign's document in the manifest."""
-        campaign: Mapping[str, Any] = self.manifest.get("campaign", {})
-        return campaign
+        return self.manifest.get("campaign", {})
 
     @property
     def stages(self) -> Mapping[str, Mapping[str, Any]]:
-        """The stages of the manifest, by id."""
-        stages: Mapping[str, Mapping[str, Any]] = self.manifest.get("stages", {})
-        return stages
+        return self.manifest.get("stages", {})
 
     @property
     def unfinished(self) -> Mapping[str, Mapping[str, Any]]:
-        """The stages that are not complete."""
         return {name: stage for name, stage in self.stages.items() if stage.get("status") not in FINISHED}
 
     @property
@@ -154,9 +149,7 @@ class RunTables:
 
     @property
     def significance(self) -> float | None:
-        """The significance of the campaign's tests."""
-        significance: float | None = self.campaign.get("assessment", {}).get("significance")
-        return significance
+        return self.campaign.get("assessment", {}).get("significance")
 
     @property
     def crowds(self) -> Mapping[str, Sequence[str]]:
@@ -171,7 +164,11 @@ class RunTables:
     @property
     def naive(self) -> str:
         """The ego before round 2 in sentences, after "the"."""
-        return ego_called(self.campaign.get("ego", {}).get("driver", LEARNED))
+        return ego_called(self._driver)
+
+    @property
+    def _driver(self) -> str:
+        return self.campaign.get("ego", {}).get("driver", LEARNED)
 
     @property
     def change(self) -> Change:
@@ -183,7 +180,6 @@ class RunTables:
 
     @cached_property
     def played(self) -> pd.DataFrame:
-        """The rows of `episodes` that could be played."""
         return self.episodes[were_played(self.episodes)]
 
     @cached_property
@@ -198,13 +194,11 @@ class RunTables:
     def counts_of(self, arm: str) -> tuple[int, int]:
         """How many games of an arm the ego failed, and how many could be played, over all training seeds. Games without
         a trained player are the same for each seed, and count once."""
-        driver = self.manifest.get("campaign", {}).get("ego", {}).get("driver", LEARNED)
-        is_untrained = driver != LEARNED and arm in (NAIVE_ALONE.name, NAIVE_VS_SUMO.name)
+        is_untrained = self._driver != LEARNED and arm in (NAIVE_ALONE.name, NAIVE_VS_SUMO.name)
         rows = list(self.rates_of(arm).values())[: 1 if is_untrained else None]
         return sum(map(failures, rows)), sum(map(played, rows))
 
     def games_of(self, arm: str) -> pd.DataFrame:
-        """The arm's games that could be played."""
         return self.played[self.played["arm"] == arm]
 
     def arms_of(self, question: str, persona: str) -> tuple[str, str]:
@@ -222,7 +216,6 @@ class RunTables:
         return made[-1] if made else self.change.ego(persona)
 
     def tests_of(self, question: str, persona: str) -> list[Row]:
-        """The rows of `comparisons` on a question about a persona."""
         rows = self.comparisons
         return rows[(rows["question"] == question) & (rows["persona"] == persona)].to_dict("records")
 

@@ -12,8 +12,6 @@ from harness.reports.page_template import page_of
 
 @dataclass(frozen=True, kw_only=True)
 class RunningStage:
-    """A stage that is being carried out."""
-
     name: str
     kind: str
     since_s: float | None

@@ -47,22 +47,18 @@ _STYLES: Mapping[str, Mapping[str, Any]] = {"fine": _FINE, "near_miss": _NEAR} |
     tone: {"marker": "X", "s": 46, "color": TONES[colour], "linewidths": 0} for tone, colour in _COLOURS.items()
 }
 """How points are drawn: a failure by the key of `RISK_TONES`, another game by its ending."""
-_KIND_WORDS = (
-    {"fine": "without failure or near miss", "near_miss": "near miss"}
-    | {
-        tone: f"failure: {RISK_TONES[tone]}"
-        if tone == "unknown"
-        else f"failure: serious injury at most {RISK_TONES[tone]}"
-        for tone in _COLOURS
-    }
-    | {"severe": f"failure: serious injury {RISK_TONES['severe']}"}
-)
+_KIND_WORDS = {
+    "fine": "without failure or near miss",
+    "near_miss": "near miss",
+    "small": f"failure: serious injury at most {RISK_TONES['small']}",
+    "medium": f"failure: serious injury at most {RISK_TONES['medium']}",
+    "severe": f"failure: serious injury {RISK_TONES['severe']}",
+    "unknown": f"failure: {RISK_TONES['unknown']}",
+}
 
 
 @dataclass(frozen=True, kw_only=True)
 class _ShownArm:
-    """An arm of the section."""
-
     name: str
     label: str
     who: str
@@ -147,7 +143,6 @@ def _words(axis: str, arm: _ShownArm, tables: RunTables) -> str:
 
 
 def _where(failed: pd.DataFrame, starts: pd.DataFrame, labels: Sequence[str]) -> str:
-    """Where the failures lie, of all starts."""
     if failed.empty:
         return f"None of {len(starts):,} starts fails."
     ranges = [

@@ -41,7 +41,6 @@ def planned_in_words(tables: RunTables) -> str:
 
 
 def over_trainings_sentence(row: Row, tables: RunTables, who: str) -> str:
-    """A row of `over_trainings` in words."""
     if row["verdict"] == Verdict.NOT_ENOUGH_TRAININGS:
         asked = row["trainings"] + row["trainings_left_out"]
         return f"The question is answered for {row['trainings']} of {asked} trainings, and {TOO_FEW_TRAININGS}."
@@ -215,7 +214,6 @@ def _of_seed(tables: RunTables, question: str, persona: str, seed: int) -> Answe
 
 
 def as_sentence(reason: str) -> str:
-    """The reason for a withheld answer as a sentence."""
     return f"{reason[:1].upper()}{reason[1:]}."
 
 

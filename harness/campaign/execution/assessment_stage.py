@@ -123,7 +123,6 @@ def help_with_arm(stage: AssessmentStage, run: StageRun, scene: OpenScene) -> di
 
 
 def _labels(stage: AssessmentStage) -> dict[str, str | int]:
-    """The cells that all records of an arm share."""
     return {"arm": stage.name, "persona": stage.persona, "seed": stage.seed}
 
 

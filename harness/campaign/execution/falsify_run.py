@@ -37,8 +37,6 @@ NAIVE_ARMS = "naive_vs_"
 
 @dataclass(frozen=True, kw_only=True)
 class PlannedSearch:
-    """The searches of one arm by one searcher."""
-
     stage: AssessmentStage
     searcher: Searcher
     learned: bool

@@ -8,7 +8,7 @@ from harness.campaign.plan.planned_drivers import EquilibriumMixture, descriptio
 from harness.campaign.storage.arm_tables import arm_tables
 from harness.campaign.storage.run_folder import RunFolder
 from harness.errors import StageFailed
-from harness.evaluation.game_theory.nash import NoEquilibrium, equilibrium_shares
+from harness.evaluation.game_theory.nash import solve
 
 
 def equilibrium_of(mixture: EquilibriumMixture, folder: RunFolder) -> tuple[float, ...]:
@@ -18,12 +18,12 @@ def equilibrium_of(mixture: EquilibriumMixture, folder: RunFolder) -> tuple[floa
     """
     cells = [[_mean_payoffs(folder, arm) for arm in row] for row in mixture.arms]
     payoffs = np.array(cells, dtype=np.float64)  # [E, N, P]
-    try:
-        ego_shares, non_ego_shares = equilibrium_shares(payoffs[..., 0], payoffs[..., 1])
-    except NoEquilibrium as error:
-        raise StageFailed(f"the mixture of {description(mixture)} can't be weighed: {error}") from error
+    found = solve(payoffs[..., 0], payoffs[..., 1])
+    if not found:
+        reason = "no candidate equilibrium could be verified"
+        raise StageFailed(f"the mixture of {description(mixture)} can't be weighed: {reason}")
     are_egos = not any(persona_of(each) for each in mixture.members)
-    return tuple(float(share) for share in (ego_shares if are_egos else non_ego_shares))
+    return tuple(map(float, found[0].ego_shares if are_egos else found[0].non_ego_shares))
 
 
 def _mean_payoffs(folder: RunFolder, arm: str) -> tuple[float, float]:

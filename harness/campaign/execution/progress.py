@@ -33,8 +33,6 @@ LINE_EVERY_S = 60.0
 
 
 class _Rate(ProgressColumn):
-    """Steps, episodes or trials a second."""
-
     def render(self, task: Task) -> Text:
         rate = (task.finished_speed or task.speed) if task.total is not None else None
         return Text((f"{rate:,.0f}/s" if rate >= 10 else f"{rate:.2g}/s") if rate else "", style="progress.data.speed")
@@ -111,7 +109,6 @@ class StageProgress:
 
 
 def event_line(event: Event) -> str:
-    """An event in words; progress has none."""
     match event.kind:
         case "progress":
             return ""

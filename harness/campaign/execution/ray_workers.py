@@ -225,8 +225,7 @@ class RayWorkers:
         submitted, errors = self._submitted.pop(ref), self._ray.exceptions
         submitted.node.running -= 1
         try:
-            event: Event = self._ray.get(ref)
-            return event
+            return self._ray.get(ref)
         except errors.RayTaskError as error:
             return Event(kind="failed", stage=submitted.task.id, message=str(error))
         except errors.RayError as error:

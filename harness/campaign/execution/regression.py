@@ -41,7 +41,6 @@ class PlayedAgain:
 
     @property
     def passed(self) -> bool:
-        """Whether the ego reached its goal."""
         return self.outcome == "goal" and not self.error
 
 

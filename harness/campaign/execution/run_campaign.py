@@ -44,8 +44,7 @@ def run_campaign(
     """
     folder.claim(campaign.document.name, campaign.quick)
     with folder.held():
-        kept = _play(campaign, folder, start_workers, console, keep_going)
-        if kept is not None:
+        if (kept := _play(campaign, folder, start_workers, console, keep_going)) is not None:
             return kept
         from harness.campaign.results.results import write_results  # imports pandas and statistics
 
@@ -167,7 +166,6 @@ class _ManifestKeeper:
         self._write()
 
     def note(self, event: Event) -> None:
-        """Write down what happened to a stage."""
         match event.kind:
             case "done":
                 changes = {"message": "", **event.info, "status": _status(event.info)}

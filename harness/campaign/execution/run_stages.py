@@ -36,8 +36,6 @@ MOST_ABANDONED = 20
 
 
 class Workers(Protocol):
-    """What carries tasks out."""
-
     @property
     def capacity(self) -> int:
         """Number of tasks that they can carry out at a time now."""
@@ -73,7 +71,6 @@ class Crashes:
         self._abandoned: dict[str, dict[int, str]] = {}
 
     def next_attempt(self, stage: Stage) -> Attempt:
-        """What the worker that gets a stage has to know."""
         first = stage.id not in self._attempted
         self._attempted.add(stage.id)
         self._place.pop(stage.id, None)

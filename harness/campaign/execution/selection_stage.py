@@ -19,7 +19,6 @@ from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import StageRun
 from harness.campaign.plan.planned_drivers import Side
 from harness.campaign.plan.stages import SelectionStage
-from harness.campaign.storage.run_folder import SELECTED
 from harness.campaign.storage.versions import versions_of_numbers
 from harness.drivers.policy_file import policy_files, read_policy, write_policy
 from harness.errors import StageFailed
@@ -48,7 +47,7 @@ def carry_out_selection(stage: SelectionStage, run: StageRun, scene: OpenScene) 
     labels = {"persona": stage.persona, "seed": stage.seed, "round": stage.round, "role": ROLES[stage.learner]}
     names = [each.stage.removesuffix(stage_id("", stage.seed)) for each in stage.candidates]
     rows = [{**labels, "strategy": stage.name, **row} for row in selection_rows(names, games)]
-    table = folder.work(stage.id) / SELECTED
+    table = folder.work(stage.id) / "selections.csv"
     write_csv(table_of("selections", rows), table)
     facts = {
         "episodes": games.payoffs.size,

@@ -71,7 +71,6 @@ class RunContext(CampaignPlayers):
         return self._with_errors(_opened(self.folder.scene, self._vehicle_type(stage), files), stage)
 
     def open_roads(self, stage: TrainingStage) -> list[OpenScene]:
-        """The scenes on whose roads a training plays too."""
         return [self._with_errors(open_scene(each), stage) for each in self.roads] if stage.learns_on_roads else []
 
     def _with_errors(self, scene: OpenScene, stage: Stage) -> OpenScene:
@@ -152,8 +151,6 @@ _LOGGER = logging.getLogger("harness.preparation")
 
 @dataclass(frozen=True, kw_only=True)
 class Event:
-    """Something that happened to a task."""
-
     kind: Literal["started", "progress", "segment", "done", "failed", "crashed", "skipped"]
     """segment: a segment of a training, a game of an arm or a trial of a search starts, and `done` is its number. It
     is for `run_stages` alone and is not emitted. progress with a message: what the stage waits for before its own

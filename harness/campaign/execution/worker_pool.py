@@ -99,7 +99,6 @@ _POLL_S = 1.0
 
 
 def cores() -> int:
-    """Cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 

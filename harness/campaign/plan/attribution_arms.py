@@ -13,6 +13,8 @@ baseline in one trait alone is the baseline without it, and has no arms of its o
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from harness.campaign.plan.alone_bounds import alone_bounds
 from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.plan.strategy_stages import SeedStages
@@ -32,7 +34,7 @@ def plan_attribution(of: SeedStages) -> list[AssessmentStage]:
         person
         for persona, differing in traits.differing.items()
         for trait in differing
-        for person in (_without(persona, trait, traits), _alone(persona, trait, traits))
+        for person in _exchanged(persona, trait, traits)
     ]
     alone = of.assessment(persona_alone(traits.baseline), persona=traits.baseline)
     return [alone, *(of.pair(naive, each) for each in dict.fromkeys((baseline, *people)))]
@@ -52,8 +54,7 @@ def _question(campaign: Campaign, traits: PersonTraits, persona: str, trait: str
     own, baseline = (against_persona(NaiveEgo(), name) for name in (persona, traits.baseline))
     without, alone = baseline.name, ""
     if trait != ALL_TRAITS:
-        people = _without(persona, trait, traits), _alone(persona, trait, traits)
-        without, alone = (Arm(ego=NaiveEgo(), non_ego=each).name for each in people)
+        without, alone = (Arm(ego=NaiveEgo(), non_ego=each).name for each in _exchanged(persona, trait, traits))
     return TraitQuestion(
         persona=persona,
         seed=seed,
@@ -66,15 +67,10 @@ def _question(campaign: Campaign, traits: PersonTraits, persona: str, trait: str
     )
 
 
-def _without(persona: str, trait: str, traits: PersonTraits) -> PersonaNonEgo:
-    """A persona with the baseline's value of a trait."""
+def _exchanged(persona: str, trait: str, traits: PersonTraits) -> tuple[PersonaNonEgo, PersonaNonEgo]:
+    """A persona with the baseline's value of a trait, and the baseline with the persona's."""
+    own, baseline = PersonaNonEgo(persona=persona), PersonaNonEgo(persona=traits.baseline)
     if traits.differing[persona] == (trait,):
-        return PersonaNonEgo(persona=traits.baseline)
-    return PersonaNonEgo(persona=persona, borrowed=Borrowed(trait=trait, of=traits.baseline))
-
-
-def _alone(persona: str, trait: str, traits: PersonTraits) -> PersonaNonEgo:
-    """The baseline with a persona's value of a trait."""
-    if traits.differing[persona] == (trait,):
-        return PersonaNonEgo(persona=persona)
-    return PersonaNonEgo(persona=traits.baseline, borrowed=Borrowed(trait=trait, of=persona))
+        return baseline, own
+    without = replace(own, borrowed=Borrowed(trait=trait, of=traits.baseline))
+    return without, replace(baseline, borrowed=Borrowed(trait=trait, of=persona))

@@ -17,14 +17,14 @@ with a folder of policies has the same arms and no trainings.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from harness.campaign.plan.alone_bounds import alone_bounds
 from harness.campaign.plan.stages import AssessmentStage, SearchStage, Stage, TrainingStage
 from harness.campaign.plan.strategy_stages import SeedStages, ego_learns, has_round_2, robust_is_last
 from harness.config.campaign import Campaign
 from harness.evaluation.competence import Question, ResearchQuestion
-from harness.evaluation.planned_tests import Family
+from harness.evaluation.planned_tests import About, PlannedTest
 from harness.evaluation.strategies import (
     ATTENTIVE,
     NAIVE_ALONE,
@@ -123,25 +123,21 @@ def questions(campaign: Campaign, personas: Sequence[str], tunable: bool = False
     return asked
 
 
-def family_lines(families: Sequence[Family]) -> Iterator[str]:
+def family_lines(families: Mapping[About, Sequence[PlannedTest]]) -> Iterator[str]:
     """A line for each family of Holm's correction: its tests, and their training seeds."""
-    for family in families:
-        tests = ", ".join(dict.fromkeys(f"{test.question} {test.persona}" for test in family.tests))
-        seeds = list(dict.fromkeys(str(seed) for test in family.tests for seed in test.seeds))
-        each = "each by itself" if len(family.tests[0].seeds) == 1 else "together"
+    for about, tests in families.items():
+        named = ", ".join(dict.fromkeys(f"{test[0].question} {test[0].persona}" for test in tests))
+        seeds = list(dict.fromkeys(str(asked.seed) for test in tests for asked in test))
+        each = "each by itself" if len(tests[0]) == 1 else "together"
         trainings = f"training seeds {', '.join(seeds)} {each}" if len(seeds) > 1 else f"training seed {seeds[0]}"
-        size = f"{len(family.tests)} test{'' if len(family.tests) == 1 else 's'}"
-        yield f"Holm's correction over {size} about {family.about.value}: {tests} ({trainings})"
+        size = f"{len(tests)} test{'' if len(tests) == 1 else 's'}"
+        yield f"Holm's correction over {size} about {about.value}: {named} ({trainings})"
 
 
-def family_records(families: Sequence[Family]) -> list[dict[str, object]]:
+def family_records(families: Mapping[About, Sequence[PlannedTest]]) -> list[dict[str, object]]:
     """A record for each family, as `family_lines` tells it."""
-    return [
-        {
-            "about": family.about.value,
-            "tests": [
-                {"question": test.question, "persona": test.persona, "seeds": list(test.seeds)} for test in family.tests
-            ],
-        }
-        for family in families
-    ]
+    return [{"about": about.value, "tests": list(map(_record, tests))} for about, tests in families.items()]
+
+
+def _record(test: PlannedTest) -> dict[str, object]:
+    return {"question": test[0].question, "persona": test[0].persona, "seeds": [asked.seed for asked in test]}

@@ -113,7 +113,6 @@ class SeedStages:
         return [replace(self, seed=seed)._driver(PersonaNonEgo(persona=name)) for seed in others]
 
     def pair(self, ego: EgoStrategy, non_ego: PersonaNonEgo | RoundAnswer) -> AssessmentStage:
-        """The assessment of an ego against a person."""
         person = non_ego.of if isinstance(non_ego, RoundAnswer) else non_ego
         assert isinstance(person, PersonaNonEgo)
         return self.assessment(Arm(ego=ego, non_ego=non_ego), persona=person.persona)

@@ -46,3 +46,8 @@ def _boundary(game: PinnedGame, scene: OpenScene) -> Boundary:
 def _quantities(scene: OpenScene, starts: Sequence[InitialState] | Sequence[PinnedStart]) -> pd.DataFrame:
     position_m, speed_mps = (np.array([getattr(each, name) for each in starts]) for name in ("position_m", "speed_mps"))
     return start_quantities(scene.places, position_m, speed_mps)
+
+
+def people_drive(scene: OpenScene) -> bool:
+    """Whether all people of a scene are drivers of cars."""
+    return all(each.drives for each in scene.document.non_ego)

@@ -8,8 +8,8 @@ from typing import Any
 
 import pandas as pd
 
-from harness.campaign.plan.stages import AssessmentStage, arms_of, strategies_of
-from harness.campaign.results.drawn_starts import drawn_starts
+from harness.campaign.plan.stages import AssessmentStage
+from harness.campaign.results.drawn_starts import people_drive
 from harness.campaign.results.matchups import matchups_of
 from harness.campaign.results.read_run import ReadRun
 from harness.campaign.results.run_people import by_who_drove, declared_of, failures_by_trait, is_played, questions_of
@@ -32,41 +32,27 @@ from harness.road.scene.open_scene import OpenScene
 
 def evaluated(run: ReadRun) -> RunTables:
     """What a run's report is made of, without its replays."""
-    entries = judged(run.manifest["stages"], run.campaign, run.stages, _goals(run))
-    manifest = {**run.manifest, "stages": entries}
-    prevented = {}
-    if run.reference_drivers is not None:
-        counts = count_prevented(run.reference_drivers, run.episodes)
-        prevented = {"reference_drivers": run.reference_drivers, "preventability": counts}
-    arms = arms_of(run.stages)
-    found = realism(run.conduct, arms, declared_of(run), _figures_of_people(run.scene))
-    asked, significance = questions_of(run, found), run.campaign.assessment.significance
+    read, campaign = run.tables, run.campaign
+    entries = judged(run.manifest["stages"], campaign, run.stages, _goals(run))
+    found = realism(read.conduct, read.arms, declared_of(run), _figures_of_people(run.scene))
+    asked, significance = questions_of(run, found), campaign.assessment.significance
     played = [each for each in asked if is_played(each, run)]
-    tables = RunTables(
-        manifest=manifest,
-        arms=arms,
-        strategies=strategies_of(run.stages),
-        episodes=run.episodes,
-        summary=summarise(run.episodes),
-        comparisons=compare(played, run.episodes, significance, planned=len(asked)),
-        over_trainings=compare_over_trainings(asked, run.episodes, significance),
-        training=_with_ends(run.training, entries),
-        reconfiguration=run.reconfiguration,
-        selections=run.selections,
-        shields=compare_shielded(arms, run.episodes),
-        perception=compare_perception(arms, run.episodes, len(run.campaign.seeds)),
-        manoeuvres=run.manoeuvres,
-        causes=run.causes,
-        takeovers=run.takeovers,
-        starts=drawn_starts(run.scene, run.campaign.start_seed, run.episodes["episode"]),
+    tables = replace(
+        read,
+        manifest={**run.manifest, "stages": entries},
+        summary=summarise(read.episodes),
+        comparisons=compare(played, read.episodes, significance, planned=len(asked)),
+        over_trainings=compare_over_trainings(asked, read.episodes, significance),
+        training=_with_ends(read.training, entries),
+        shields=compare_shielded(read.arms, read.episodes),
+        perception=compare_perception(read.arms, read.episodes, len(campaign.seeds)),
         realism=found,
         game=_game(run),
-        non_ego_drives=people_drive(run.scene),
-        populations=by_who_drove(run.campaign, run.episodes),
+        populations=by_who_drove(campaign, read.episodes),
+        preventability=count_prevented(read.reference_drivers, read.episodes),
         **failures_by_trait(run),
-        **prevented,
     )
-    return with_acceptance(tables, run.campaign, is_judged=run.reference_drivers is not None)
+    return with_acceptance(tables, campaign, is_judged=run.is_judged)
 
 
 def with_acceptance(tables: RunTables, campaign: Campaign, is_judged: bool) -> RunTables:
@@ -89,22 +75,18 @@ def with_acceptance(tables: RunTables, campaign: Campaign, is_judged: bool) -> R
 
 def csv_tables(run: ReadRun, tables: RunTables) -> dict[str, pd.DataFrame]:
     """The tables that the run folder gets, by the names of their files."""
-    names = ["episodes", "training", "summary", "comparisons", "causes", "manoeuvres", "realism", "undecided"]
+    names = ["episodes", "training", "summary", "comparisons"]
+    names += ["conduct", "causes", "manoeuvres", "realism", "undecided"]
     names += ["attribution"] if run.campaign.attribution is not None else []
-    names += ["reference_drivers", "takeovers", "preventability"] if run.reference_drivers is not None else []
+    names += ["reference_drivers", "takeovers", "preventability"] if run.is_judged else []
     names += ["over_trainings"] if len(tables.over_trainings) else []
     names += ["populations"] if run.campaign.population else []
     names += ["reconfiguration"] if is_tuned(run.manifest) else []
     names += ["shields"] if run.campaign.ego.shield is not None else []
     names += ["perception"] if run.campaign.ego.perception is not None else []
-    names += ["selections"] if len(run.selections) else []
-    found = {"conduct": run.conduct} | {name: getattr(tables, name) for name in names}
+    names += ["selections"] if len(tables.selections) else []
+    found = {name: getattr(tables, name) for name in names}
     return found | (tables.game.tables if tables.game is not None else {})
-
-
-def people_drive(scene: OpenScene) -> bool:
-    """Whether all people of a scene are drivers of cars."""
-    return all(each.drives for each in scene.document.non_ego)
 
 
 def _figures_of_people(scene: OpenScene) -> tuple[HumanFigure, ...]:
@@ -115,7 +97,7 @@ def _figures_of_people(scene: OpenScene) -> tuple[HumanFigure, ...]:
 
 def _goals(run: ReadRun) -> dict[str, Goals]:
     """How often the player of each arm without people reached its goal, by the arm's stage."""
-    games = games_by_arm(run.episodes)
+    games = games_by_arm(run.tables.episodes)
     alone = [each for each in run.stages if isinstance(each, AssessmentStage) and each.is_without_people]
     return {each.id: goals_alone(games.get((each.name, each.seed)), "ego" if each.ego else "non_ego") for each in alone}
 
@@ -134,4 +116,4 @@ def _game(run: ReadRun) -> GameFindings | None:
     if game is None:
         return None
     significance = run.campaign.assessment.significance
-    return find(game.pairings, game.responses, game.training_personas, run.episodes, significance)
+    return find(game.pairings, game.responses, game.training_personas, run.tables.episodes, significance)

@@ -44,7 +44,6 @@ def league_rows(
 
 
 def person_in(arm: Arm) -> str:
-    """What a league calls the person of an arm."""
     match arm.non_ego:
         case None:
             return NOBODY

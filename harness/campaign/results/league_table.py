@@ -65,7 +65,6 @@ def write_league(ego: str, folder: Path, results: Mapping[str, RunResult]) -> Le
 
 
 def worst_pairings_first(table: pd.DataFrame) -> pd.DataFrame:
-    """The rows of the table `league` in its order."""
     return table.sort_values(
         ["reason", "failure_rate", "serious_injuries", "scene", "person", "seed", "shield"],
         ascending=[True, False, False, True, True, True, True],
@@ -76,7 +75,6 @@ def worst_pairings_first(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def _failures(results: Mapping[str, RunResult]) -> Iterator[str]:
-    """What failed, in sentences."""
     for name, result in results.items():
         for stage, reason in result.failed_stages.items():
             yield f"{name}: {stage}: {reason or _NOT_FINISHED}"

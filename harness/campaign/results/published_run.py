@@ -7,13 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from harness.campaign.plan.stages import arms_of, strategies_of
-from harness.campaign.results.drawn_starts import drawn_starts
-from harness.campaign.results.evaluate_run import people_drive, with_acceptance
+from harness.campaign.results.drawn_starts import drawn_starts, people_drive
+from harness.campaign.results.evaluate_run import with_acceptance
 from harness.campaign.results.matchups import matchups_of
 from harness.campaign.results.served_report import PAGE
 from harness.campaign.storage.manifest import campaign_in, digests_read, done_in, is_tuned, planned
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign
+from harness.evaluation.columns import TABLES
 from harness.evaluation.game_theory.findings import GameFindings, cautions
 from harness.evaluation.tables import read_csv, table_of
 from harness.files import has_digest
@@ -23,10 +24,6 @@ from harness.road.scene.open_scene import open_scene
 from harness.shipped_documents import shipped
 
 _ALWAYS = ("episodes", "summary", "comparisons", "training")
-_MAYBE = (
-    *("causes", "manoeuvres", "over_trainings", "preventability", "realism", "undecided", "attribution", "selections"),
-    *("reconfiguration", "shields", "perception", "populations", "reference_drivers", "takeovers"),
-)
 _OF_GAME = ("gaps", "crossplay", "equilibria", "generalisation")
 
 
@@ -51,7 +48,8 @@ def published_tables(folder: RunFolder) -> RunTables:
     """The tables of a published run, as far as they are published. Raises UsageError for a damaged one."""
     manifest = folder.manifest()
     stages, campaign = planned(manifest), campaign_in(manifest)
-    names = [*_ALWAYS, *(name for name in _MAYBE if _is_there(folder.path, name))]
+    known = [name for name in TABLES if name in RunTables.__dataclass_fields__]
+    names = [name for name in known if name in _ALWAYS or _is_there(folder.path, name)]
     frames: dict[str, Any] = {name: read_csv(folder.path / f"{name}.csv") for name in names}
     tables = RunTables(
         manifest=manifest,

@@ -10,46 +10,48 @@ from typing import Any
 import pandas as pd
 from rich.console import Console
 
-from harness.campaign.plan.stages import Stage
+from harness.campaign.plan.stages import Stage, arms_of, strategies_of
+from harness.campaign.results.drawn_starts import drawn_starts, people_drive
 from harness.campaign.results.shown_work import doing
-from harness.campaign.storage.arm_tables import PLAYED, arm_tables
+from harness.campaign.storage.arm_tables import PLAYED, ArmTables, arm_tables
 from harness.campaign.storage.manifest import campaign_in, done_in, planned
-from harness.campaign.storage.run_folder import JUDGED, SELECTED, TAKEN_OVER, RunFolder
+from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign
 from harness.drivers.policy_file import policy_files, read_card
 from harness.errors import UsageError
 from harness.evaluation.strategies import stage_id
 from harness.evaluation.tables import is_of_a_search, joined, read_csv
 from harness.evaluation.trace_file import check_traces
+from harness.reports.run_tables import RunTables
 from harness.road.scene.open_scene import OpenScene, open_scene
 
 
 @dataclass(frozen=True, kw_only=True)
 class ReadRun:
-    """What a run folder holds. The frames are tables of `evaluation.columns.TABLES`, over all stages that are done."""
+    """What a run folder holds, before it is evaluated."""
 
-    manifest: Mapping[str, Any]
     campaign: Campaign
     stages: Sequence[Stage]
     """All that are planned."""
     scene: OpenScene
     policies: Mapping[str, Mapping[str, Any]]
     """The policy.json of each policy that was trained, derived or selected, by its stage."""
-    episodes: pd.DataFrame
-    causes: pd.DataFrame
-    manoeuvres: pd.DataFrame
-    conduct: pd.DataFrame
-    training: pd.DataFrame
-    reconfiguration: pd.DataFrame
-    selections: pd.DataFrame
-    reference_drivers: pd.DataFrame | None
-    """None where no arm's failures are judged."""
-    takeovers: pd.DataFrame
+    tables: RunTables
+    """What the stages that are done stored."""
+
+    @property
+    def manifest(self) -> Mapping[str, Any]:
+        return self.tables.manifest
 
     @property
     def done(self) -> set[str]:
         """The stages that are done, by id."""
         return set(done_in(self.manifest))
+
+    @property
+    def is_judged(self) -> bool:
+        """Whether reference drivers judged the failures of an arm."""
+        return bool(done_in(self.manifest, "preventability"))
 
 
 def read_run(folder: RunFolder, console: Console) -> ReadRun:
@@ -57,34 +59,37 @@ def read_run(folder: RunFolder, console: Console) -> ReadRun:
     are missing or damaged."""
     manifest = folder.manifest()
     folder.check_whole(manifest)
-    campaign = campaign_in(manifest)
-    scene = open_scene(folder.scene)
+    scene, stages = open_scene(folder.scene), planned(manifest)
     for stage in done_in(manifest, "assessment"):
         _check_log(folder, stage, manifest["stages"][stage])
-    training = joined("training", _gathered(folder, manifest, "training", "training.csv"))
-    searches = joined("reconfiguration", _gathered(folder, manifest, "reconfiguration", "reconfiguration.csv"))
-    selections = joined("selections", _gathered(folder, manifest, "selection", SELECTED))
+    frames: dict[str, Any] = {}
+    for name, kind in _MADE_BY.items():
+        frames[name] = joined(name, _gathered(folder, manifest, kind, f"{name}.csv"))
     made = [stage for kind in ("training", "conditioning", "selection") for stage in done_in(manifest, kind)]
     policies = {stage: _policy(folder.policy(stage)) for stage in made}
-    judged, courses = (list(_gathered(folder, manifest, "preventability", table)) for table in (JUDGED, TAKEN_OVER))
     with doing(console, "measuring the games"):
         arms = [arm_tables(folder, stage, scene) for stage in done_in(manifest, "assessment")]
-    return ReadRun(
+    for name in ArmTables.__dataclass_fields__:
+        frames[name] = joined(name, [getattr(arm, name) for arm in arms])
+    tables = RunTables(
         manifest=manifest,
-        campaign=campaign,
-        stages=planned(manifest),
-        scene=scene,
-        policies=policies,
-        episodes=joined("episodes", [arm.episodes for arm in arms]),
-        causes=joined("causes", [arm.causes for arm in arms]),
-        manoeuvres=joined("manoeuvres", [arm.manoeuvres for arm in arms]),
-        conduct=joined("conduct", [arm.conduct for arm in arms]),
-        training=training,
-        reconfiguration=searches,
-        selections=selections,
-        reference_drivers=joined("reference_drivers", judged) if judged else None,
-        takeovers=joined("takeovers", courses),
+        arms=arms_of(stages),
+        strategies=strategies_of(stages),
+        starts=drawn_starts(scene, campaign_in(manifest).start_seed, frames["episodes"]["episode"]),
+        non_ego_drives=people_drive(scene),
+        **frames,
     )
+    return ReadRun(campaign=campaign_in(manifest), stages=stages, scene=scene, policies=policies, tables=tables)
+
+
+_MADE_BY = {
+    "training": "training",
+    "reconfiguration": "reconfiguration",
+    "selections": "selection",
+    "reference_drivers": "preventability",
+    "takeovers": "preventability",
+}
+"""Tables that stages store, each with the kind of these stages."""
 
 
 def result_table(folder: RunFolder, name: str) -> pd.DataFrame:

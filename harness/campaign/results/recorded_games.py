@@ -108,7 +108,6 @@ def watching_order(
 
 
 def takeovers_of(table: pd.DataFrame) -> Takeovers:
-    """The table by game."""
     return {(str(arm), int(seed), int(episode)): rows for (arm, seed, episode), rows in table.groupby(_GAME)}
 
 
@@ -159,7 +158,6 @@ def delta_v_of(game: Any) -> float | None:
 
 
 def _perceived(trace: pd.DataFrame, ego: str) -> list[tuple[int, list[str], int]]:
-    """`GameTracks.perceived` of a trace."""
     found = list[tuple[int, list[str], int]]()
     if not {"ego_lost", "ego_ghosts"} <= {*trace.columns}:
         return found
@@ -209,5 +207,4 @@ def scene_drawing(scene: OpenScene) -> dict[str, Any]:
 
 
 def _points(line: FloatArray) -> list[list[float]]:
-    points: list[list[float]] = np.round(line, 2).tolist()
-    return points
+    return np.round(line, 2).tolist()

@@ -117,12 +117,10 @@ class PlayedGame:
 
     @property
     def name(self) -> str:
-        """The name of its files."""
         return replay_name(self.record.arm, self.record.seed, self.record.episode)
 
     @property
     def title(self) -> str:
-        """The game in words."""
         return f"{self.record.arm}, seed {self.record.seed}, episode {self.record.episode}"
 
     @property
@@ -131,7 +129,6 @@ class PlayedGame:
         return names_in_pictures(self.record.persona)
 
     def write_replay(self, folder: Path) -> None:
-        """Write a folder that SUMO-GUI plays."""
         write_replay(self.trace, self.scene, folder, title=self.title, names=self.names)
 
 

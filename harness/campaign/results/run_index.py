@@ -81,10 +81,7 @@ def has_page(path: Path) -> bool:
 
 
 def _accepted(file: Path) -> bool | None:
-    if not file.is_file():
-        return None
-    accepted: bool | None = json.loads(file.read_bytes())["accepted"]
-    return accepted
+    return json.loads(file.read_bytes())["accepted"] if file.is_file() else None
 
 
 def _worst(summary: Path) -> tuple[WorstCell | None, WorstCell | None]:
@@ -114,7 +111,6 @@ def _greatest(cells: Sequence[WorstCell]) -> WorstCell | None:
 
 
 def _log_of(file: Path) -> list[re.Match[str]]:
-    """What the log says of stages, in order."""
     if not file.is_file():
         return []
     lines = file.read_text(encoding="utf-8", errors="replace").splitlines()
@@ -122,7 +118,6 @@ def _log_of(file: Path) -> list[re.Match[str]]:
 
 
 def _last_events(begun: Sequence[re.Match[str]]) -> dict[str, bool]:
-    """For each stage in the log whether it has ended."""
     return {each["stage"]: each["what"] != "started" for each in begun}
 
 

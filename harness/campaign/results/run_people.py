@@ -47,7 +47,6 @@ def questions_of(run: ReadRun, realism: pd.DataFrame) -> list[Question]:
 
 
 def is_played(question: Question, run: ReadRun) -> bool:
-    """Whether the arms of a question are finished."""
     return {stage_id(arm, question.seed) for arm in (question.baseline, question.treatment)} <= run.done
 
 
@@ -64,8 +63,9 @@ def failures_by_trait(run: ReadRun) -> dict[str, pd.DataFrame]:
         for question in trait_questions(run.campaign, traits_in(run.manifest))
         if {stage_id(arm, question.seed) for arm in question.arms} <= run.done
     ]
-    undecided = count_undecided(run.episodes, run.causes, run.conduct)
-    return {"attribution": attribute(asked, run.episodes), "undecided": undecided}
+    tables = run.tables
+    undecided = count_undecided(tables.episodes, tables.causes, tables.conduct)
+    return {"attribution": attribute(asked, tables.episodes), "undecided": undecided}
 
 
 _SUMMARY_COLUMNS = [name for name in TABLES["populations"] if name not in ("arm", "population", "seed", "persona")]

@@ -60,7 +60,6 @@ class ServedRuns:
         return name in {file.parent.name for file in self._folder.glob(f"*/{MANIFEST}")}
 
     def _report(self, name: str) -> ServedReport | PublishedReport:
-        """The report of a run as it is now."""
         run = RunFolder(self._folder / name)
         key = (name, run.manifest_file.stat().st_mtime_ns)
         with self._lock:

@@ -35,7 +35,6 @@ def verdicts_of(campaign: Campaign, tables: RunTables) -> Verdicts:
 
 
 def shown_result(campaign: Campaign, tables: RunTables, verdicts: Verdicts) -> RunResult:
-    """What the terminal shows."""
     checks = tables.acceptance
     return RunResult(
         lines=tuple(_lines(campaign, tables, verdicts)),

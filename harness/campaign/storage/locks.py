@@ -21,33 +21,25 @@ class InUse(HarnessError):
 @contextlib.contextmanager
 def only_one(file: Path) -> Iterator[None]:
     """Hold a lock during the block. Raises InUse, at once, if another process holds it."""
-    owner = file.with_name(f"{file.name}.owner")
-    with contextlib.ExitStack() as stack:
-        try:
-            stack.enter_context(_held(file))
-        except Timeout:
-            name = ""
-            with contextlib.suppress(OSError, UnicodeDecodeError):
-                name = owner.read_text(encoding="utf-8")[:200].strip()
-            raise InUse(name or "another process") from None
-        stack.callback(owner.unlink, missing_ok=True)
+    owner, name = file.with_name(f"{file.name}.owner"), ""
+    with contextlib.suppress(OSError, UnicodeDecodeError):
+        name = owner.read_text(encoding="utf-8")[:200].strip()
+    with _held(file, 0.0, name or "another process"):
         owner.write_text(f"process {os.getpid()}", encoding="utf-8")
-        yield
+        try:
+            yield
+        finally:
+            owner.unlink(missing_ok=True)
 
 
-@contextlib.contextmanager
-def held_by_worker(folder: Path, name: str, timeout_s: float) -> Iterator[None]:
+def held_by_worker(folder: Path, name: str, timeout_s: float) -> contextlib.AbstractContextManager[None]:
     """Register this process in a folder under a name, during the block: `wait_for_workers` waits for that.
 
     At most one process at a time has a name. Raises InUse if another one still has it after `timeout_s`.
     """
     make_folder(folder)
-    with contextlib.ExitStack() as stack:
-        try:
-            stack.enter_context(_held(folder / f"{name}.lock", timeout_s))
-        except Timeout:
-            raise InUse(f"{name}: a process that was lost still has its lock, after {timeout_s:g} s") from None
-        yield
+    lost = f"{name}: a process that was lost still has its lock, after {timeout_s:g} s"
+    return _held(folder / f"{name}.lock", timeout_s, lost)
 
 
 def is_held(file: Path) -> bool:
@@ -55,7 +47,7 @@ def is_held(file: Path) -> bool:
     try:
         with _held(file):
             return False
-    except Timeout:
+    except InUse:
         return True
     except OSError:
         return False
@@ -65,19 +57,20 @@ def wait_for_workers(folder: Path, timeout_s: float) -> None:
     """Wait until no process is registered in a folder. Raises InUse if one still is after `timeout_s`."""
     until = time.monotonic() + timeout_s
     for file in sorted(folder.glob("*.lock")):
-        try:
-            with _held(file, max(until - time.monotonic(), 0.0)):
-                file.unlink(missing_ok=True)
-        except Timeout:
-            raise InUse("a worker of an earlier command") from None
+        with _held(file, max(until - time.monotonic(), 0.0), "a worker of an earlier command"):
+            file.unlink(missing_ok=True)
 
 
 @contextlib.contextmanager
-def _held(file: Path, timeout_s: float = 0.0) -> Iterator[None]:
-    """Raises Timeout if another process holds the lock. On a file system without locks it is always free."""
+def _held(file: Path, timeout_s: float = 0.0, holder: str = "") -> Iterator[None]:
+    """Raises InUse, with these words, if another process holds the lock. On a file system without locks it is always
+    free."""
     lock = FileLock(file, fallback_to_soft=False)  # a soft lock would outlive a process that is killed
-    with contextlib.suppress(NotImplementedError):
-        lock.acquire(timeout=timeout_s)
+    try:
+        with contextlib.suppress(NotImplementedError):
+            lock.acquire(timeout=timeout_s)
+    except Timeout:
+        raise InUse(holder) from None
     try:
         yield
     finally:

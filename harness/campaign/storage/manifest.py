@@ -165,7 +165,6 @@ def checksum_of_content(manifest: Mapping[str, Any]) -> str:
 
 
 def campaign_in(manifest: Mapping[str, Any]) -> Campaign:
-    """The campaign of a run."""
     return Campaign.model_validate(manifest["campaign"], strict=False)
 
 

@@ -46,8 +46,8 @@ from harness.evaluation.strategies import stage_id
 from harness.files import content_of, drop_scratch, has_digest, leads_out, links_in, make_folder, write_atomically
 
 MANIFEST = "manifest.json"
-JUDGED, TAKEN_OVER, SELECTED = "reference_drivers.csv", "takeovers.csv", "selections.csv"
-"""The tables that the judgement of an arm's failures makes, of verdicts and of courses, and that of a selection."""
+JUDGED, TAKEN_OVER = "reference_drivers.csv", "takeovers.csv"
+"""The tables that the judgement of an arm's failures makes, of verdicts and of courses."""
 _PATIENCE_S = 10.0  # the time that workers of a killed command may take to end
 _MOST_MANIFEST_BYTES = 50_000_000
 _RUN = "run the campaign again"
@@ -69,8 +69,6 @@ def _refuse(files: Sequence[Path], remedy: str) -> None:
 
 @dataclass(frozen=True)
 class RunFolder:
-    """Where everything of a run is."""
-
     path: Path
 
     @property
@@ -112,7 +110,6 @@ class RunFolder:
 
     @property
     def scratch(self) -> Path:
-        """Where workers keep temporary files."""
         return self.path / ".stages" / "scratch"
 
     @property
@@ -122,11 +119,9 @@ class RunFolder:
 
     @property
     def lock(self) -> Path:
-        """Held by the command that is running."""
         return self.path / ".stages" / "lock"
 
     def segments(self, stage: str) -> Path:
-        """The segments of an arm that is not done."""
         return self.work(stage) / "segments"
 
     @property
@@ -159,11 +154,7 @@ class RunFolder:
         """The facts of a stage that was done from these very inputs, without an error; None if it is not done, or if
         its files are missing or damaged."""
         record = self.done(stage)
-        made = any((self.policy(stage) / name).is_file() for name in ("policy.safetensors", "driver.toml"))
-        made = made or self.traces(stage).is_file() or (self.work(stage) / JUDGED).is_file()
         if record is None or record.get("key") != key or record["info"].get("errors"):
-            return None
-        if not made and not record["info"].get("settled"):
             return None
         return None if mismatches(record, self.path) else dict(record["info"])
 

@@ -9,9 +9,10 @@ docs/acceptance.md says in which games each bound is measured, and by which inte
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property, partial
-from typing import Any, Literal, NamedTuple
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -63,7 +64,6 @@ class Check:
 
     @property
     def passed(self) -> bool:
-        """Whether the bound is kept."""
         return self.measured and self.limit <= self.allowed
 
 
@@ -91,21 +91,26 @@ class Evidence:
 
 @dataclass(frozen=True, kw_only=True)
 class Subject:
-    """The ego that is judged about one persona and training seed."""
+    """The ego that is judged by one bound, about one persona and training seed."""
 
     ego: EgoStrategy
+    bound: str
+    allowed: float
     persona: str
     seed: int
 
-
-class Measured(NamedTuple):
-    """What was measured for one bound in one arm, as in `Check`."""
-
-    arm: str
-    value: float
-    limit: float
-    games: int
-    detail: str = ""
+    def check(self, arm: str, value: float = np.nan, limit: float = np.nan, games: int = 0) -> Check:
+        """The check of what was measured in an arm; by default nothing was."""
+        return Check(
+            bound=self.bound,
+            persona=self.persona,
+            seed=self.seed,
+            arm=arm,
+            value=value,
+            limit=limit,
+            allowed=self.allowed,
+            games=games,
+        )
 
 
 def judge(
@@ -116,16 +121,13 @@ def judge(
     `bounds` are those of docs/acceptance.md with their values. A bound that can't be measured has a check with NaN,
     which does not pass; so has every bound about players of which a question is not answered.
     """
-    checks = []
-    for name, allowed in bounds.items():
-        for persona in personas:
-            for seed in seeds:
-                subject = Subject(ego=judged_ego(judged, persona, seed, evidence), persona=persona, seed=seed)
-                check = partial(Check, bound=name, persona=persona, seed=seed, allowed=allowed)
-                for measured in _measured(name, subject, evidence):
-                    if reason := evidence.unanswered(persona, seed):
-                        measured = measured._replace(value=np.nan, limit=np.nan, detail=reason)
-                    checks.append(check(**measured._asdict()))
+    checks: list[Check] = []
+    for (bound, allowed), persona, seed in product(bounds.items(), personas, seeds):
+        ego = judged_ego(judged, persona, seed, evidence)
+        subject = Subject(ego=ego, bound=bound, allowed=allowed, persona=persona, seed=seed)
+        reason = evidence.unanswered(persona, seed)
+        for check in _checks(subject, evidence):
+            checks.append(replace(check, value=np.nan, limit=np.nan, detail=reason) if reason else check)
     return checks
 
 
@@ -151,21 +153,19 @@ def judged_ego(judged: JudgedEgo, persona: str, seed: int, evidence: Evidence) -
     return assessed[-1] if assessed else planned[0] if planned else NaiveEgo()
 
 
-def _measured(bound: str, subject: Subject, evidence: Evidence) -> Iterator[Measured]:
-    match bound:
+def _checks(subject: Subject, evidence: Evidence) -> Iterator[Check]:
+    match subject.bound:
         case "failure_rate_alone":
-            yield _rate("failure_rate", Arm(ego=subject.ego).name, subject.seed, evidence)
+            yield _rate("failure_rate", Arm(ego=subject.ego).name, subject, evidence)
         case "speed_loss_mps":
             yield _speed_loss(subject, evidence)
         case "gap_share":
             yield from _gap_shares(subject, evidence)
-        case _:
+        case "preventable_failure_rate":
+            yield from (_preventable(arm, subject, evidence) for arm in _arms_against(subject, evidence))
+        case rate:
             for arm in _arms_against(subject, evidence):
-                if bound == "preventable_failure_rate":
-                    yield _preventable(arm, subject.seed, evidence)
-                else:
-                    measured = _rate(bound, arm, subject.seed, evidence)
-                    yield measured._replace(detail=_detail(bound, arm, subject, evidence))
+                yield replace(_rate(rate, arm, subject, evidence), detail=_detail(arm, subject, evidence))
 
 
 def _arms_against(subject: Subject, evidence: Evidence) -> list[str]:
@@ -182,19 +182,19 @@ def _arms_against(subject: Subject, evidence: Evidence) -> list[str]:
     return arms or [against_persona(subject.ego, subject.persona).name]
 
 
-def _rate(column: str, arm: str, seed: int, evidence: Evidence) -> Measured:
-    row = evidence.rows.get((arm, seed))
+def _rate(column: str, arm: str, subject: Subject, evidence: Evidence) -> Check:
+    row = evidence.rows.get((arm, subject.seed))
     if row is None:
-        return Measured(arm, np.nan, np.nan, 0)
-    return Measured(arm, row[column], row[f"{column}_high"], row["episodes"] - row["errors"])
+        return subject.check(arm)
+    return subject.check(arm, row[column], row[f"{column}_high"], row["episodes"] - row["errors"])
 
 
-def _detail(bound: str, arm: str, subject: Subject, evidence: Evidence) -> str:
+def _detail(arm: str, subject: Subject, evidence: Evidence) -> str:
     """What a rate in an arm is made of; for harm to others also what it is beside the naive ego."""
     row = evidence.rows.get((arm, subject.seed))
-    if row is None or not np.isfinite(row[bound]):
+    if row is None or not np.isfinite(row[subject.bound]):
         return ""
-    match bound:
+    match subject.bound:
         case "near_miss_rate":
             return by_criterion([row])
         case "harm_to_others_rate":
@@ -207,34 +207,33 @@ def _detail(bound: str, arm: str, subject: Subject, evidence: Evidence) -> str:
             return ""
 
 
-def _preventable(arm: str, seed: int, evidence: Evidence) -> Measured:
-    failures = _rate("failure_rate", arm, seed, evidence)
-    judged = evidence.preventability
+def _preventable(arm: str, subject: Subject, evidence: Evidence) -> Check:
+    failures, judged = _rate("failure_rate", arm, subject, evidence), evidence.preventability
     if judged is None:
-        return Measured(arm, np.nan, np.nan, 0)
+        return subject.check(arm)
     for row in by_regulation(judged, arm):
-        if row["seed"] == seed:
-            return Measured(arm, row["from_start_rate"], row["from_start_rate_high"], failures.games)
-    return failures if failures.value == 0.0 else Measured(arm, np.nan, np.nan, 0)
+        if row["seed"] == subject.seed:
+            return subject.check(arm, row["from_start_rate"], row["from_start_rate_high"], failures.games)
+    return failures if failures.value == 0.0 else subject.check(arm)
 
 
-def _speed_loss(subject: Subject, evidence: Evidence) -> Measured:
+def _speed_loss(subject: Subject, evidence: Evidence) -> Check:
     naive, judged = (against_persona(ego, subject.persona).name for ego in (NaiveEgo(), subject.ego))
     before, after, _ = pairs_of(games_by_arm(evidence.episodes), subject.seed, naive, judged, ["ego_mean_speed_mps"])
     losses = (before - after)[:, 0]
     value = float(losses.mean()) if len(losses) else np.nan
     _, high = mean_interval(losses)
-    return Measured(judged, value, high if np.isfinite(high) else value, len(losses))
+    return subject.check(judged, value, high if np.isfinite(high) else value, len(losses))
 
 
-def _gap_shares(subject: Subject, evidence: Evidence) -> Iterator[Measured]:
+def _gap_shares(subject: Subject, evidence: Evidence) -> Iterator[Check]:
     ego, found = strategy_name(subject.ego), False
     for row in evidence.gaps.to_dict("records"):
         if (row["role"], row["ego"], row["persona"], row["seed"]) == ("ego", ego, subject.persona, subject.seed):
             scale, found = abs(row["payoff"]) or np.nan, True
             high = row["ci_high"] if np.isfinite(row["ci_high"]) else row["gap"]
-            measured = Measured(f"{ego}_vs_{row['non_ego']}", row["gap"] / scale, high / scale, row["pairs"])
+            measured = subject.check(f"{ego}_vs_{row['non_ego']}", row["gap"] / scale, high / scale, row["pairs"])
             lacks_power = row["verdict"] == GapVerdict.LACKS_POWER
-            yield measured._replace(limit=np.nan, detail=LACKS_POWER) if lacks_power else measured
+            yield replace(measured, limit=np.nan, detail=LACKS_POWER) if lacks_power else measured
     if not found:
-        yield Measured(against_persona(subject.ego, subject.persona).name, np.nan, np.nan, 0)
+        yield subject.check(against_persona(subject.ego, subject.persona).name)

@@ -103,30 +103,29 @@ def compare(
     return typed(with_verdicts(table, significance))
 
 
-def with_verdicts(table: pd.DataFrame, significance: float, difference: str = "mean_difference") -> pd.DataFrame:
-    """A table with the verdict of each row by its pairs, p-values and difference. A row that has a verdict keeps it:
-    that of a closed gate."""
+def with_verdicts(
+    table: pd.DataFrame, significance: float, difference: str = "mean_difference", pairs: str = "pairs"
+) -> pd.DataFrame:
+    """A table with the verdict of each row by its pairs, p-values and difference, in the columns of these names. A row
+    that has a verdict keeps it: that of a closed gate."""
     verdicts = [
-        row["verdict"] or _verdict(row, row[difference], significance).value for row in table.to_dict("records")
+        row["verdict"] or _verdict(row, row[pairs], row[difference], significance).value
+        for row in table.to_dict("records")
     ]
     return table.assign(verdict=verdicts)
 
 
-def _verdict(row: Mapping[Any, Any], difference: float, significance: float) -> Verdict:
-    if row["pairs"] < 2:
+def _verdict(row: Mapping[Any, Any], pairs: int, difference: float, significance: float) -> Verdict:
+    """NaN as p_value: there is no test; as p_holm: it is secondary."""
+    if pairs < 2:
         return Verdict.NOT_ENOUGH_PAIRS
-    return verdict_of(row["p_value"], row["p_holm"], difference, significance)
-
-
-def verdict_of(p_value: float, p_holm: float, difference: float, significance: float) -> Verdict:
-    """The verdict of a test. NaN as `p_value`: there is no test; as `p_holm`: it is secondary."""
-    if np.isnan(p_value):
+    if np.isnan(row["p_value"]):
         return Verdict.NO_DIFFERENCE if difference == 0 else Verdict.ALL_EQUAL
-    if p_value >= significance:
+    if row["p_value"] >= significance:
         return Verdict.NOT_SIGNIFICANT
-    if np.isnan(p_holm):
+    if np.isnan(row["p_holm"]):
         return Verdict.SECONDARY
-    return Verdict.SIGNIFICANT if p_holm < significance else Verdict.BEFORE_HOLM_ONLY
+    return Verdict.SIGNIFICANT if row["p_holm"] < significance else Verdict.BEFORE_HOLM_ONLY
 
 
 def holm(p_values: FloatArray, planned: int | None = None) -> FloatArray:

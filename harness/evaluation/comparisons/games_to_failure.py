@@ -34,8 +34,6 @@ class SoonerVerdict(str, Enum):
 
 @dataclass(frozen=True, kw_only=True)
 class SearchResult:
-    """What one search found."""
-
     arm: str
     seed: int
     searcher: str

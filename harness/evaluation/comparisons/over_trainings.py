@@ -32,7 +32,7 @@ from harness.evaluation.comparisons.comparison import (
     games_by_arm,
     holm,
     pairs_by_episode,
-    verdict_of,
+    with_verdicts,
 )
 from harness.evaluation.competence import Question, Verdict, gate_of
 from harness.evaluation.planned_tests import LEAST_TRAININGS, PRIMARY, About, PlannedTest, families
@@ -96,28 +96,24 @@ def compare_over_trainings(questions: Sequence[Question], episodes: pd.DataFrame
     counted, where its question is not answered, or has fewer than two pairs. A start is left out, and counted, where
     one of the other trainings has no pair of it. Raises ValueError when an arm has two games for one episode.
     """
-    planned = next((each.tests for each in families(questions) if each.about is About.TRAININGS), ())
+    planned = families(questions).get(About.TRAININGS, [])
     games = games_by_arm(episodes)
     table = table_of("over_trainings", [_row(test, games) | {"planned_tests": len(planned)} for test in planned])
     table["p_holm"] = holm(table["p_value"].to_numpy(dtype=np.float64), len(planned))
-    table["verdict"] = [
-        row["verdict"] or verdict_of(row["p_value"], row["p_holm"], row["mean_difference"], significance).value
-        for row in table.to_dict("records")
-    ]
-    return typed(table)
+    return typed(with_verdicts(table, significance, pairs="starts"))
 
 
 def _row(test: PlannedTest, games: Mapping[Any, pd.DataFrame]) -> dict[str, Any]:
     measured, reasons = list[pd.Series](), list[str]()
     column, sign = METRICS[PRIMARY]
-    for question in test.asked:
+    for question in test:
         sides = pairs_by_episode(games, question.seed, question.baseline, question.treatment, [column]).dropna()
         closed = gate_of(question, games)
         if closed["reason"] or len(sides) < 2:
             reasons.append(f"training seed {question.seed}: {closed['reason'] or 'fewer than two pairs of games'}")
         else:
-            measured.append(sign[test.question] * (sides.iloc[:, 1] - sides.iloc[:, 0]))
-    row: dict[str, Any] = {"question": test.question, "persona": test.persona, "about": About.TRAININGS.value}
+            measured.append(sign[test[0].question] * (sides.iloc[:, 1] - sides.iloc[:, 0]))
+    row: dict[str, Any] = {"question": test[0].question, "persona": test[0].persona, "about": About.TRAININGS.value}
     row |= {"trainings": len(measured), "trainings_left_out": len(reasons)}
     if len(measured) < LEAST_TRAININGS:
         return row | {"verdict": Verdict.NOT_ENOUGH_TRAININGS.value, "reason": "; ".join(reasons)}
@@ -126,7 +122,7 @@ def _row(test: PlannedTest, games: Mapping[Any, pd.DataFrame]) -> dict[str, Any]
     starts = differences.shape[1]
     row |= {"starts": starts, "starts_left_out": len(table) - starts}
     if starts < 2:
-        return row | {"verdict": Verdict.NOT_ENOUGH_PAIRS.value}
+        return row
     of_each = differences.mean(axis=1)
     row |= {"mean_difference": differences.mean(), "least": of_each.min(), "most": of_each.max()}
     found = crossed_mean(differences)

@@ -44,8 +44,6 @@ RATES = (*_RATES,)
 
 @dataclass(frozen=True, kw_only=True)
 class Side:
-    """One run's games of an arm."""
-
     value: float
     """The rate, or the mean in m/s."""
     low: float

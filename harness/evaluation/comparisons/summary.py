@@ -73,7 +73,6 @@ def _summary_row(arm: str, persona: str, seed: int, games: pd.DataFrame) -> dict
 
 
 def _severity(played: pd.DataFrame) -> dict[str, object]:
-    """The columns of the collisions' severity."""
     delta_v_mps = played[["ego_delta_v_mps", "other_delta_v_mps"]].max(axis=1)
     return {
         "closing_speed_mps": played["closing_speed_mps"].mean(),
@@ -84,7 +83,6 @@ def _severity(played: pd.DataFrame) -> dict[str, object]:
 
 
 def _harm(played: pd.DataFrame) -> dict[str, object]:
-    """The columns of harm to others than the ego."""
     marks = played["harm_to_others"].dropna()
     return {
         "person_failures": played["person_failed"].sum(min_count=1),

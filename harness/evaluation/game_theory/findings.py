@@ -28,7 +28,6 @@ class GameFindings:
 
     @property
     def tables(self) -> dict[str, pd.DataFrame]:
-        """The tables by their names in the run folder."""
         return {name: table for name, table in vars(self).items() if name != "cautions"}
 
 
@@ -57,7 +56,6 @@ def find(
 
 
 def cautions(pairings: Sequence[Pairing], episodes: pd.DataFrame) -> list[tuple[int, str]]:
-    """`GameFindings.cautions` of a run."""
     games = games_by_arm(episodes)
     bounds = dict.fromkeys((each.seed, bound) for each in pairings for bound in each.alone)
     reasons = [(seed, gate([bound], seed, games)["reason"]) for seed, bound in bounds]

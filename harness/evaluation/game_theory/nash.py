@@ -23,7 +23,6 @@ from typing import NamedTuple
 import numpy as np
 import scipy  # loads its parts at their first use: a worker that solves nothing does without
 
-from harness.errors import HarnessError
 from harness.game.arrays import BoolArray, FloatArray
 
 TOLERANCE = 1e-7
@@ -47,29 +46,11 @@ _DIGITS = 6
 """Equilibria whose shares agree to this many digits are the same."""
 
 
-class NoEquilibrium(HarnessError):
-    """No candidate verified. Every finite game has an equilibrium (Nash 1950): the numerical accuracy is too low."""
-
-
 class Equilibrium(NamedTuple):
     """Shares of the ego's strategies [E] and of the non-ego's strategies [N]; each sums to 1."""
 
     ego_shares: FloatArray
     non_ego_shares: FloatArray
-
-
-def equilibrium_shares(ego_payoffs: FloatArray, non_ego_payoffs: FloatArray) -> Equilibrium:
-    """One verified equilibrium of the game [E, N], always the same one.
-
-    It is the equilibrium with the highest ego payoff. Among equal payoffs it is the first one when the ego's shares,
-    then the non-ego's, are compared in the order of the strategies, larger shares first.
-
-    Raises NoEquilibrium when none verifies, ValueError when the matrices are not a game.
-    """
-    equilibria = solve(ego_payoffs, non_ego_payoffs)
-    if not equilibria:
-        raise NoEquilibrium("no candidate equilibrium could be verified")
-    return equilibria[0]
 
 
 def regrets(ego_payoffs: FloatArray, non_ego_payoffs: FloatArray, at: Equilibrium) -> tuple[float, float]:
@@ -81,7 +62,9 @@ def regrets(ego_payoffs: FloatArray, non_ego_payoffs: FloatArray, at: Equilibriu
 
 
 def solve(ego_payoffs: FloatArray, non_ego_payoffs: FloatArray) -> list[Equilibrium]:
-    """The verified equilibria of the game [E, N] in the order of `equilibrium_shares`; empty when none verified.
+    """The verified equilibria of the game [E, N], the one with the highest ego payoff first; empty when none verified:
+    every finite game has one (Nash 1950), but the numerical accuracy is too low. Among equal payoffs the first is the
+    one with larger shares, when the ego's, then the non-ego's, are compared in the order of the strategies.
 
     Of a continuum of equilibria (a degenerate game) they are some corners. There may be more of a game with more than
     `MOST_SUPPORTS` pairs of supports.

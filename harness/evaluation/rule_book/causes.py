@@ -218,7 +218,6 @@ def _hidden_until_s(course: Course, other: int, begin: int, last: int) -> float:
 
 
 def event_words(event: str) -> str:
-    """The name of a manoeuvre or of another event as text."""
     return _WORDS.get(event, event.replace("_", " "))
 
 
@@ -228,7 +227,7 @@ def causes_in_words(causes: pd.DataFrame) -> Mapping[tuple[str, int, int], str]:
     return {(row.arm, row.seed, row.episode): f"{event_words(row.event)} -> {row.reaction}" for row in rows}
 
 
-def cause_lines(causes: pd.DataFrame, most: int = MOST_LINES) -> list[str]:
+def cause_lines(causes: pd.DataFrame) -> list[str]:
     """The causes in rows of `causes.csv`, alike ones as one line, the most frequent first; empty without rows.
 
     E.g. "24 of 30: cuts in from the left, 0.4 to 0.9 s before contact; the ego sees it, no reaction (braking up to 0.9
@@ -236,8 +235,8 @@ def cause_lines(causes: pd.DataFrame, most: int = MOST_LINES) -> list[str]:
     """
     kinds = causes.groupby(["ego_outcome", "deed", "ego_broke"], sort=False)
     groups = sorted((rows for _, rows in kinds), key=lambda rows: -len(rows))
-    lines = [f"{len(rows)} of {len(causes)}: {kind_in_words(rows)}" for rows in groups[:most]]
-    rest = sum(len(rows) for rows in groups[most:])
+    lines = [f"{len(rows)} of {len(causes)}: {kind_in_words(rows)}" for rows in groups[:MOST_LINES]]
+    rest = sum(len(rows) for rows in groups[MOST_LINES:])
     return [*lines, f"{rest} of {len(causes)}: other causes"] if rest else lines
 
 

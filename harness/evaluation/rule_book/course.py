@@ -116,9 +116,7 @@ class Course:
     @cached_property
     def _from_lane_m(self) -> FloatArray:
         """[T, P] to the left of the centre of the nearest lane."""
-        routes, offset_m = self.quantities.world.road.routes, self.quantities.lateral_offset_m
-        lanes_m = routes.lane_offset_m[routes.rows(self.quantities.state.station_m)]
-        return offset_m - nearest_lane_m(lanes_m, offset_m)
+        return self.quantities.lateral_offset_m - self.game.lane_centre_m
 
     @cached_property
     def sideways_m(self) -> FloatArray:
@@ -188,10 +186,3 @@ def end_of_run(mask: BoolArray, step: int) -> int:
     """The last step of the stretch of `mask` [T] that `step` is in."""
     ends = np.flatnonzero(~mask[step:])
     return step + int(ends[0]) - 1 if len(ends) else len(mask) - 1
-
-
-def nearest_lane_m(lanes_m: FloatArray, offset_m: FloatArray) -> FloatArray:
-    """[...] the centre of the lane nearest to each offset [...], of lanes with the centres [..., L] (NaN: none)."""
-    away_m = np.abs(lanes_m - offset_m[..., None])
-    nearest = np.where(np.isnan(away_m), np.inf, away_m).argmin(-1)
-    return np.take_along_axis(lanes_m, nearest[..., None], -1)[..., 0]

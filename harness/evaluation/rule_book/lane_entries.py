@@ -12,8 +12,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from harness.evaluation.recorded_game import nearest_lane_m
 from harness.evaluation.rule_book import thresholds as at
-from harness.evaluation.rule_book.course import SLACK, Course, Span, end_of_run, nearest_lane_m
+from harness.evaluation.rule_book.course import SLACK, Course, Span, end_of_run
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.roles import role_in_words
 

@@ -28,7 +28,6 @@ class Headways(NamedTuple):
 
 @lru_cache(maxsize=1)
 def headways(game: RecordedGame, player: int) -> Headways:
-    """The headways of a player."""
     q = game.quantities
     speed_mps = q.state.speed_mps[:, player]
     turned = q.bodies.heading_rad - q.state.heading_rad[:, player, None]
@@ -80,7 +79,6 @@ class Criterion:
         return f"{self.words} of at most {self.limit_s:g} s"
 
     def is_met(self, game: RecordedGame, player: int) -> bool:
-        """Whether the player comes so close."""
         return self.least_s(game, player) <= self.limit_s
 
 

@@ -38,7 +38,6 @@ class Impact:
 
     @property
     def delta_v_mps(self) -> float:
-        """The greater change of velocity."""
         return max(self.own.delta_v_mps, self.other.delta_v_mps)
 
 

@@ -33,8 +33,6 @@ rear and the near side. Each side counts as the near side, because somebody may 
 
 
 class Risk(NamedTuple):
-    """Bounds of a probability."""
-
     low: float
     high: float
 

@@ -49,5 +49,4 @@ of the mass that SUMO gives a pedestrian. A wheelchair with its user: our own.""
 
 
 def mass_kg(vehicle_class: str) -> float:
-    """The mass of a road user of a class."""
     return MASS_KG.get(vehicle_class, _CAR_KG)

@@ -20,8 +20,6 @@ WHEELBASE_M = float(Actuators.model_fields["wheelbase_m"].default)
 
 @dataclass(frozen=True, kw_only=True)
 class SampleDrive:
-    """One seeded drive of `DRIVE_S`."""
-
     lapses: tuple[tuple[float, float], ...]
     """Begin and end of each lapse, s."""
     shoulder_glance: bool

@@ -35,8 +35,6 @@ class TermExample:
 
 @dataclass(frozen=True, kw_only=True)
 class PayoffFunction:
-    """A fuzzy term as a function of its quantity."""
-
     name: str
     quantity: str
     meaning: str
@@ -98,7 +96,6 @@ def term_examples(persona: Persona) -> list[TermExample]:
 
 
 def payoff_functions(persona: Persona) -> list[PayoffFunction]:
-    """Every fuzzy term of a persona's payoff."""
     found = []
     alpha = persona.payoff.alpha["human"]
     for name, (weight, function) in persona.payoff.fuzzy.items():

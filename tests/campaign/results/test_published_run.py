@@ -69,6 +69,7 @@ def test_serve__the_page_of_one_published_run_is_made_from_its_tables(folder: Pa
     assert answer is not None
     page = Page(answer[1].decode())
     assert page.cells("summary")[1:] == _cells(folder / "cyclist" / "summary.csv")
+    assert "What led to failures" in page.text  # from causes.csv: manoeuvres.csv is not published
 
 
 def _cells(table: Path) -> list[list[str]]:

@@ -157,13 +157,15 @@ def test_finished__only_with_the_key_of_these_inputs(folder: RunFolder) -> None:
     assert folder.finished("naive-seed1", "key") is None
     folder.work("naive-seed1").mkdir()
     assert folder.finished("naive-seed1", "key") is None
-    folder.finish("naive-seed1", "key", {"steps": 7})
-    assert folder.finished("naive-seed1", "key") is None  # the policy it made is not there
-    folder.policy("naive-seed1").mkdir()
-    (folder.policy("naive-seed1") / "policy.safetensors").touch()
+    policy = folder.policy("naive-seed1") / "policy.safetensors"
+    policy.parent.mkdir()
+    policy.touch()
+    folder.finish("naive-seed1", "key", {"steps": 7}, [policy])
     assert folder.finished("naive-seed1", "key") == {"steps": 7}
     assert folder.finished("naive-seed1", "another") is None
     assert folder.finished("speedy-seed1", "key") is None
+    policy.unlink()
+    assert folder.finished("naive-seed1", "key") is None
 
 
 @pytest.mark.parametrize("content", ["", "[]", "7", '{"key": "key"', '{"info": {}}', "\udcff"])

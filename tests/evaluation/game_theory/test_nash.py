@@ -11,8 +11,6 @@ from harness.evaluation.game_theory.nash import (
     LP_ACCURACY,
     TOLERANCE,
     VALUE_ACCURACY,
-    NoEquilibrium,
-    equilibrium_shares,
     regrets,
     solve,
 )
@@ -53,7 +51,7 @@ def test_constant_game__every_profile_is_an_equilibrium_and_the_first_is_chosen(
     same = np.full((2, 3), 7.0)
     pure = [(x.tolist(), y.tolist()) for x in np.eye(2) for y in np.eye(3)]
     assert [each for each in found(same, same) if each in pure] == pure
-    x, y = equilibrium_shares(same, same)
+    x, y = solve(same, same)[0]
     assert (x.tolist(), y.tolist()) == ([1, 0], [1, 0, 0])
 
 
@@ -109,11 +107,11 @@ def test_solve__finds_an_equilibrium_and_no_equilibrium_has_a_regret(game):
 
 @settings(deadline=None, max_examples=25)
 @given(games())
-def test_equilibrium_shares__have_the_highest_ego_payoff_and_are_always_the_same(game):
-    x, y = equilibrium_shares(*game)
+def test_solve__begins_with_the_highest_ego_payoff_and_always_with_the_same(game):
+    x, y = solve(*game)[0]
     best = max(each.ego_shares @ game[0] @ each.non_ego_shares for each in solve(*game))
     assert x @ game[0] @ y == pytest.approx(best, abs=1e-5 * max(np.ptp(game[0]), 1e-9))
-    again = equilibrium_shares(*game)
+    again = solve(*game)[0]
     assert (again[0].tolist(), again[1].tolist()) == (x.tolist(), y.tolist())
 
 
@@ -159,8 +157,6 @@ def test_solve__does_not_return_a_candidate_that_does_not_verify(monkeypatch):
     for name in ("_by_vertices", "_by_integer_program"):
         monkeypatch.setattr(nash, name, lambda *game: iter([(np.array([np.nan, 0.0]), np.array([0.0, 0.0]))]))
     assert solve(PENNIES, -PENNIES) == []
-    with pytest.raises(NoEquilibrium):
-        equilibrium_shares(PENNIES, -PENNIES)
 
 
 @pytest.mark.parametrize(
