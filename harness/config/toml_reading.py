@@ -129,6 +129,8 @@ def read_document(path: str | Path, model: type[D]) -> D:
 def nearest(word: str, words: Iterable[str]) -> str:
     """A remedy: the valid word nearest to a misspelt one, else the valid words (the first 40)."""
     words = sorted(words)
+    if not words:
+        return "there are none"
     if close := name_like(word, words):
         return f"did you mean {close!r}?"
     more = f" and {len(words) - _NAMES_SHOWN} more" if len(words) > _NAMES_SHOWN else ""

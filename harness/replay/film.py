@@ -79,7 +79,8 @@ def write_film(
         raise UsageError(problems)
     shown = shown_steps(int(trace["step"].max()), step_length_s)
     interval_s = step_length_s * shown.step
-    centres, width_m = _centres(trace), _width_m(folder)
+    small = _small_players(folder)
+    centres, width_m = _centres(trace), SMALL_WIDTH_M if small else WIDTH_M
     touches = list(labels_of_contacts(parse_xml(folder / "scene.add.xml")))
     whose = legend(trace, names)
 
@@ -87,7 +88,7 @@ def write_film(
         """The pictures with their captions and labels, the last of them several times."""
         for done, (step, picture) in enumerate(zip(shown, plain, strict=True), 1):
             px_per_m = SIZE_PX[0] / width_m
-            labels = labels_at(trace[trace["step"] == step], names, centres[step], px_per_m)
+            labels = labels_at(trace[trace["step"] == step], names, centres[step], px_per_m, ringed=small)
             for text, at_m, contact_m in touches:
                 at_px, of_px = ((point - centres[step]) * px_per_m for point in (at_m, contact_m))
                 labels.append(Label(name=text, at_px=(at_px[0], at_px[1]), of_px=(of_px[0], of_px[1])))
@@ -138,11 +139,11 @@ def _photographed(
             raise HarnessError(f"the film could not be finished: {error}") from error
 
 
-def _width_m(folder: Path) -> float:
-    """The width of road to show: less with a small player."""
+def _small_players(folder: Path) -> set[str]:
+    """The players on foot or on a bicycle: the film shows less road, and a ring around each of them."""
     types = parse_xml(folder / "scene.add.xml").iter("vType")
-    lengths_m = [float(each.get("length", "nan")) for each in types if each.get("id") in PLAYER_COLOURS]
-    return SMALL_WIDTH_M if any(length_m < _SMALL_M for length_m in lengths_m) else WIDTH_M
+    lengths_m = {each.get("id", ""): float(each.get("length", "nan")) for each in types}
+    return {name for name in PLAYER_COLOURS if lengths_m.get(name, math.inf) < _SMALL_M}
 
 
 def _taken(file: Path) -> Image.Image:

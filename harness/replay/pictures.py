@@ -10,7 +10,7 @@ import importlib.util
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -27,6 +27,7 @@ _CAPTION_PX, _LABEL_PX = 16, 14
 _CORNER_PX = (12, 10)
 _AWAY_M = 3.5  # of the middle of a label from the middle of its vehicle
 _LEAST_AWAY_PX = 34.0
+_RING_PX = 14.0
 _INK, _PAPER, _MARGIN_PX = (20, 20, 20), (255, 255, 255), 3
 Box: TypeAlias = tuple[float, float, float, float]
 
@@ -38,11 +39,21 @@ class Label:
     name: str
     at_px: tuple[float, float]
     of_px: tuple[float, float]
+    ring: str = ""
+    """The colour of a ring around what it names; empty: none."""
 
 
-def labels_at(frame: pd.DataFrame, names: Mapping[str, str], centre_m: FloatArray, px_per_m: float) -> list[Label]:
+def labels_at(
+    frame: pd.DataFrame,
+    names: Mapping[str, str],
+    centre_m: FloatArray,
+    px_per_m: float,
+    *,
+    ringed: Collection[str] = (),
+) -> list[Label]:
     """The labels of one step's players, whose rows are in `frame`, in a picture around `centre_m` [2].
 
+    The players in `ringed`, too small to be found by their drawing, have a ring of their colour around them.
     The southernmost player has its label below it, every other one above, so that two vehicles side by side keep theirs
     apart.
     """
@@ -53,7 +64,12 @@ def labels_at(frame: pd.DataFrame, names: Mapping[str, str], centre_m: FloatArra
         x_px, y_px = (row.x_m - centre_m[0]) * px_per_m, (row.y_m - centre_m[1]) * px_per_m
         side = -1.0 if place == 0 and len(players) > 1 else 1.0
         labels.append(
-            Label(name=shown_name(str(row.player), names), at_px=(x_px, y_px + side * away_px), of_px=(x_px, y_px))
+            Label(
+                name=shown_name(str(row.player), names),
+                at_px=(x_px, y_px + side * away_px),
+                of_px=(x_px, y_px),
+                ring=f"rgb({PLAYER_COLOURS[row.player]})" if row.player in ringed else "",
+            )
         )
     return labels
 
@@ -88,6 +104,9 @@ def captioned(picture: Image.Image, caption: str, labels: Sequence[Label]) -> Im
         x, y = middle[0] + label.at_px[0], middle[1] - label.at_px[1]
         # a line up to the label's own edge: its vehicle stays free
         draw.line([(x, y), (x, 0.5 * (y + middle[1] - label.of_px[1]))], fill=_INK, width=1)
+        if label.ring:
+            x, y = middle[0] + label.of_px[0], middle[1] - label.of_px[1]
+            draw.ellipse([x - _RING_PX, y - _RING_PX, x + _RING_PX, y + _RING_PX], outline=label.ring, width=3)
     for label in labels:
         left, bottom, right, top = box_px(label)
         draw.rectangle([middle[0] + left, middle[1] - top, middle[0] + right, middle[1] - bottom], fill=_PAPER)

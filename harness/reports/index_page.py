@@ -84,7 +84,7 @@ def render_index(folder: str, runs: Sequence[IndexedRun], search: str = "") -> s
     rows = [
         {
             "run": run,
-            "address": f"{quote(run.folder.name)}/" if run.has_page or run.state in ("running", "interrupted") else "",
+            "address": f"{in_address(run.name)}/" if run.has_page or run.state in ("running", "interrupted") else "",
             "state": state_words(run),
             "tone": _tone(run),
             "cells": _cells(run),
@@ -103,9 +103,15 @@ def render_index(folder: str, runs: Sequence[IndexedRun], search: str = "") -> s
     )
 
 
-def history_of(run: IndexedRun, runs: Sequence[IndexedRun]) -> list[IndexedRun]:
-    """The runs of the same ego on the same scene that ended, up to this one, the first of them first; empty if this one
-    has not ended. `runs` are sorted, the latest first."""
+def in_address(name: str) -> str:
+    """The name of a run as one part of an address, with that of its league."""
+    return quote(name, safe="")
+
+
+def history_of(name: str, runs: Sequence[IndexedRun]) -> list[IndexedRun]:
+    """The runs of the same ego on the same scene that ended, up to the one of this name, the first of them first; empty
+    if this one has not ended. `runs` are sorted, the latest first."""
+    run = next(each for each in runs if each.name == name)
     ended = [each for each in reversed(runs) if (each.ego, each.scene, each.state) == (run.ego, run.scene, "ended")]
     return ended[: ended.index(run) + 1] if run in ended else []
 
@@ -116,10 +122,10 @@ def _comparisons(runs: Sequence[IndexedRun]) -> Iterator[tuple[Path, list[tuple[
     before: dict[tuple[str, str], list[str]] = {}
     for run in reversed(runs):
         if run.state == "ended":
-            names, own = before.setdefault((run.ego, run.scene), []), quote(run.folder.name)
-            links = [(f"compare with {names[-1]}", f"compare/{quote(names[-1])}/{own}")] if names else []
+            names, own = before.setdefault((run.ego, run.scene), []), in_address(run.name)
+            links = [(f"compare with {names[-1]}", f"compare/{in_address(names[-1])}/{own}")] if names else []
             yield run.folder, links + ([(f"history of {len(names) + 1} runs", f"history/{own}")] if names[1:] else [])
-            names.append(run.folder.name)
+            names.append(run.name)
 
 
 def terminal_table(runs: Sequence[IndexedRun]) -> Table:

@@ -194,6 +194,7 @@ def test_file__missing_names_the_nearest(write: Write) -> None:
 def test_nearest__is_one_word_or_all_words() -> None:
     assert nearest("colour", ["colours", "size"]) == "did you mean 'colours'?"
     assert nearest("xyz", ["b", "a"]) == "valid: a, b"
+    assert nearest("xyz", []) == "there are none"
 
 
 def test_document__is_frozen(write: Write) -> None:

@@ -120,6 +120,18 @@ def test_labels__two_cars_side_by_side_keep_theirs_apart() -> None:
     assert (speedy.name, speedy.of_px, speedy.at_px) == ("very speedy", (24.0, 36.0), (24.0, 78.0))
 
 
+def test_labels__a_small_player_has_a_ring_of_its_colour() -> None:
+    frame = pd.DataFrame({"player": ["ego", "non_ego"], "x_m": [0.0, 0.0], "y_m": [0.0, 5.0]})
+    ego, walker = labels_at(frame, {}, np.array([0.0, 0.0]), 19.2, ringed={"non_ego"})
+    assert (ego.ring, walker.ring) == ("", "rgb(255,127,14)")
+    asphalt = (70, 70, 90)
+    picture = np.asarray(captioned(Image.new("RGB", SIZE_PX, asphalt), "", [ego, walker]))
+    rows, columns = np.nonzero(orange(picture.astype(int)))
+    ends_px = [columns.min() - 480, columns.max() - 480, 240 - rows.max(), 240 - rows.min()]
+    assert ends_px == pytest.approx([-14, 14, 96 - 14, 96 + 14], abs=1)
+    assert tuple(picture[240 - 96, 480]) == asphalt  # the player itself is seen
+
+
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_labels__one_that_would_be_covered_moves_away_from_what_it_names(side: float) -> None:
     ego = Label(name="ego", at_px=(0.0, side * 90.0), of_px=(0.0, side * 50.0))

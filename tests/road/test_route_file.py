@@ -163,6 +163,24 @@ def test_vehicle__departs_and_arrives_within_its_route(write: Write) -> None:
     assert read_route_file(write(vehicle)).vehicles["v"].edges == ("b", "c")
 
 
+@pytest.mark.parametrize(
+    ("rate", "remedy"),
+    [
+        ('vehsPerHour="-4"', "above 0, up to 72000"),
+        ('probability="2"', "of at least 0, up to 1"),
+        ('period="0"', "of at least 0.05, up to 1e\\+07"),
+    ],
+)
+def test_flow__one_with_an_impossible_rate_is_told_the_possible_ones(rate: str, remedy: str, write: Write) -> None:
+    with pytest.raises(UsageError, match=rf"is not a number that is possible here \(give a number {remedy}\)"):
+        read_route_file(write(flow(rate)))
+
+
+def test_route__one_that_a_file_without_routes_names_has_no_valid_name(write: Write) -> None:
+    with pytest.raises(UsageError, match=r"vehicle v: unknown route 'r' \(there are none\)"):
+        read_route_file(write('<vehicle id="v" route="r"/>'))
+
+
 def test_flow__takes_its_times_from_the_interval(write: Write) -> None:
     interval = '<interval begin="2" end="7"><flow id="f" period="2"><route edges="a"/></flow></interval>'
     assert times(read_route_file(write(interval))) == [2.0, 4.0, 6.0]

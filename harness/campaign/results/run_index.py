@@ -7,13 +7,14 @@ import json
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
 from harness.campaign.results.ci_files import RESULT
 from harness.campaign.storage.locks import is_held
-from harness.campaign.storage.run_folder import MANIFEST, RunFolder
+from harness.campaign.storage.run_folder import MANIFEST, RunFolder, run_folders_in
 from harness.campaign.storage.run_log import LOG
 from harness.errors import HarnessError, UsageError
 from harness.evaluation.competence import FINISHED
@@ -27,10 +28,11 @@ _COUNTED = ("arm", "persona", "failure_rate", "collisions", "rails", "timeouts",
 
 
 def runs_in(folder: Path) -> list[IndexedRun]:
-    """The runs whose folders are in this one, the latest first. Raises UsageError if it is no folder."""
+    """The runs whose folders are in this one or in a league in it, the latest first; those of a league have its name,
+    too: `league-adas/merge`. Raises UsageError if it is no folder."""
     if not folder.is_dir():
         raise UsageError.of(folder, "", "is not a folder", "name the folder that the run folders are in")
-    found = [indexed_run(file.parent) for file in sorted(folder.glob(f"*/{MANIFEST}"))]
+    found = [replace(indexed_run(path), name=path.relative_to(folder).as_posix()) for path in run_folders_in(folder)]
     by_name = sorted(found, key=lambda run: run.name)
     return sorted(by_name, key=lambda run: (run.finished_on, (run.folder / MANIFEST).stat().st_mtime), reverse=True)
 

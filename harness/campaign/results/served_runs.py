@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from datetime import datetime, timezone
 from pathlib import Path
 from threading import Lock
-from urllib.parse import parse_qs, quote, unquote, urlsplit
+from urllib.parse import parse_qs, unquote, urlsplit
 
 from harness.campaign.plan.stages import Stage, TrainingStage, strategies_of
 from harness.campaign.plan.strategy_stages import training_settings
@@ -15,11 +15,11 @@ from harness.campaign.results.published_run import PublishedReport
 from harness.campaign.results.run_index import begun_once, has_page, indexed_run, runs_in
 from harness.campaign.results.served_report import PAGE, ServedReport
 from harness.campaign.storage.manifest import campaign_in, planned
-from harness.campaign.storage.run_folder import MANIFEST, RunFolder
+from harness.campaign.storage.run_folder import RunFolder, run_folders_in
 from harness.campaign.storage.training_curves import CHECKPOINT, curves_so_far
 from harness.config.campaign import Campaign
 from harness.errors import UsageError
-from harness.reports.index_page import history_of, render_index
+from harness.reports.index_page import history_of, in_address, render_index
 from harness.reports.learning import learning
 from harness.reports.run_tables import RunTables
 from harness.reports.running_page import RunningStage, render_running
@@ -43,8 +43,8 @@ class ServedRuns:
         if first == "compare" and len(rest) > 1 and all(map(self._is_run, rest)):
             return self._comparison(rest)
         if first == "history" and len(rest) == 1 and self._is_run(rest[0]):
-            of_ego = history_of(indexed_run(self._folder / rest[0]), runs_in(self._folder))
-            return self._comparison([run.folder.name for run in of_ego]) if len(of_ego) > 1 else None
+            of_ego = history_of(rest[0], runs_in(self._folder))
+            return self._comparison([run.name for run in of_ego]) if len(of_ego) > 1 else None
         if not rest or not self._is_run(first):
             return None
         run, below = self._folder / first, parts.path.removeprefix("/").partition("/")[2]
@@ -53,11 +53,11 @@ class ServedRuns:
         return self._report(first).answer(f"/{below}")
 
     def _comparison(self, names: Sequence[str]) -> tuple[str, bytes]:
-        addresses = [f"/{quote(name)}/" if has_page(self._folder / name) else "" for name in names]
+        addresses = [f"/{in_address(name)}/" if has_page(self._folder / name) else "" for name in names]
         return PAGE, compare_runs([self._folder / name for name in names], addresses).page().encode()
 
     def _is_run(self, name: str) -> bool:
-        return name in {file.parent.name for file in self._folder.glob(f"*/{MANIFEST}")}
+        return name in {path.relative_to(self._folder).as_posix() for path in run_folders_in(self._folder)}
 
     def _report(self, name: str) -> ServedReport | PublishedReport:
         run = RunFolder(self._folder / name)

@@ -54,6 +54,13 @@ _RUN = "run the campaign again"
 _ANY_STAGE = {"kind": "training", "name": "", "seed": 0, "status": "done"}
 
 
+def run_folders_in(folder: Path) -> list[Path]:
+    """The run folders in a folder, and those in a league in it."""
+    own = {file.parent for file in folder.glob(f"*/{MANIFEST}")}
+    of_leagues = {file.parent for file in folder.glob(f"*/*/{MANIFEST}")}
+    return sorted(own | {path for path in of_leagues if path.parent not in own})
+
+
 def _has_only_locks(folder: Path) -> bool:
     """Whether a folder holds nothing but folders, locks and a log, as a command leaves it that was killed at once."""
     names = [name for _, _, files in os.walk(folder) for name in files if name != LOG]
@@ -137,7 +144,7 @@ class RunFolder:
     @property
     def is_of_runs(self) -> bool:
         """Whether this is no run folder, but a folder that contains some."""
-        return not self.manifest_file.is_file() and any(self.path.glob(f"*/{MANIFEST}"))
+        return not self.manifest_file.is_file() and bool(run_folders_in(self.path))
 
     # --- stages --------------------------------------------------------------------------------------------------
 

@@ -150,7 +150,8 @@ def number_in(
     number = number_of(value)
     if not above < number <= most:
         message = f"{value[:60]!r} is not a number that is possible here"
-        hint = "give a number of seconds, metres or m/s" + (f", up to {most:g}" if most < inf else "")
+        least = " above 0" if above == 0.0 else f" of at least {max(above, 0.0):.2g}" if above > -inf else ""
+        hint = f"give a number{least}" + (f", up to {most:g}" if most < inf else "")
         raise UsageError.of(path, f"{where}.{name}", message, hint)
     return number
 

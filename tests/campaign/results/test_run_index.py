@@ -17,7 +17,7 @@ import pytest
 
 from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.results.run_index import indexed_run, runs_in
-from harness.campaign.results.served_runs import ServedRuns
+from harness.campaign.results.served_runs import ServedRuns, served
 from harness.campaign.storage.locks import only_one
 from harness.campaign.storage.manifest import planned
 from harness.campaign.storage.run_folder import RunFolder
@@ -104,6 +104,21 @@ def test_runs__lists_them_and_finds_them_by_a_text(folder: Path) -> None:
     assert "there is no run that contains 'x'" in of_runs(folder, "--search", "x")
 
 
+def test_runs__those_of_a_league_are_listed_with_its_name(tmp_path: Path) -> None:
+    """And where a folder has nothing but leagues, it has runs."""
+    shutil.copytree(sumo_run(), tmp_path / "league-sumo" / "paper_merge")
+    shutil.copytree(tmp_path / "league-sumo", tmp_path / "league-mine")
+    names = ["league-mine/paper_merge", "league-sumo/paper_merge"]
+    assert [each["name"] for each in json.loads(of_runs(tmp_path, "--json"))] == names
+    with serving(served(tmp_path).answer) as server:
+        address = f"http://127.0.0.1:{server.server_port}"
+        index = read(f"{address}/")
+        for link in ("league-sumo%2Fpaper_merge/", "compare/league-sumo%2Fpaper_merge/league-mine%2Fpaper_merge"):
+            assert f'href="/{link}"' in index
+            assert "paper_merge" in read(f"{address}/{link}")
+        assert "Comparison of 2 runs" in read(f"{address}/history/league-mine%2Fpaper_merge")
+
+
 def of_runs(folder: Path, *options: str) -> str:
     done = harness("runs", folder, *options)
     assert done.returncode == 0, done.stderr
@@ -177,6 +192,7 @@ def test_serve__a_run_that_has_not_ended_has_a_page_of_its_progress(tmp_path: Pa
         "/compare/first/..",
         "/history/second",
         "/history/x",
+        "/history/.%2ffirst",
         "/first/manifest.json",
     ],
 )
