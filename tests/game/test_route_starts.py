@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from harness.game.arrays import FloatArray
-from harness.game.human_factors import HumanFactors, Reaction
+from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.lapses import Attention
 from harness.game.placed_obstacles import NO_OBSTACLES
@@ -102,7 +102,7 @@ def test_starts__along_the_route_are_a_share_of_the_games(share: float) -> None:
 
 TEXTING = HumanFactors(
     attention=Attention(mean_attentive_s=2.0, lapse_s=(1.0, 2.0)),
-    reaction=Reaction(delay_s=(0.2, 0.9)),
+    delay_s=(0.2, 0.9),
 )
 
 
