@@ -94,9 +94,8 @@ class StartDistribution:
 
     Players that do not take part in every game take part in the same games, as far as their probabilities are equal.
     A player may have several drivers. Each game draws one of them by the `shares`, with its human factors.
-    In `along_route_share` of the games, the players start anywhere along their routes instead, up to their goals.
-    With `meet_in_place` they do so only in games of a player alone. In `followed_share` of the games, somebody follows
-    the ego.
+    In `along_route_share` of the games of a player alone, it starts anywhere along its route instead, up to its goal.
+    In `followed_share` of the games, somebody follows the ego.
     """
 
     world: World
@@ -109,7 +108,6 @@ class StartDistribution:
     limit_share: tuple[float, float] = (1.0, 1.0)
     signal_place: tuple[float, float] = (0.0, 1.0)
     along_route_share: float = 0.0
-    meet_in_place: bool = False
     followed_share: float = 0.0
     obstacles: Obstacles = NO_OBSTACLES
 
@@ -143,7 +141,7 @@ def draw_initial_state(starts: StartDistribution, *parts: str | int) -> InitialS
     x, y, heading = poses_of(starts.places, positions_m, world.length_m)
     positions, speeds = np.array(positions_m), np.array(speeds_mps)
     stations = positions - 0.5 * world.length_m
-    if starts.along_route_share and not (starts.meet_in_place and sum(present) > 1):
+    if starts.along_route_share and sum(present) == 1:
         along = draw_along_route(
             world.road.routes,
             generator_of(*parts, "along route"),
