@@ -26,13 +26,11 @@ from harness.assessment.recorded_courses import (
     course_of,
     start_of,
 )
-from harness.drivers.car import Car, car_of
 from harness.drivers.protocol import Driver
 from harness.drivers.reference_drivers import (
     REFERENCES,
     FullBraking,
     ReferenceDriver,
-    lane_width_of,
     reference_driver,
 )
 from harness.drivers.sumo import SumoDriver
@@ -106,14 +104,12 @@ class ConflictReplay:
     def __init__(self, scene: OpenScene, collisions: Sequence[Collision], seed: int) -> None:
         self._scene = replace(scene, perception_errors=None)  # reference drivers see what is there
         self._collisions, self._seed = collisions, seed
-        self._car: Car = car_of(scene.world, EGO)
-        self._lane_width_m = lane_width_of(scene.world)
 
     def takeovers(self) -> dict[str, list[Takeover]]:
         """How each of `REFERENCES` fares in each collision."""
         if not self._collisions:
             return {name: [] for name in REFERENCES}
-        drivers = [reference_driver(name, self._car, self._lane_width_m) for name in REFERENCES]
+        drivers = [reference_driver(name, self._scene.world) for name in REFERENCES]
         observations = self._observed()
         danger_steps = np.array([self._danger_steps(each, observations) for each in drivers])
         of_driver, games = np.nonzero(danger_steps != _NEVER)
@@ -151,7 +147,7 @@ class ConflictReplay:
     def _prevented(self, braked: Sequence[tuple[int, int]]) -> dict[tuple[int, int], bool]:
         """Whether full braking from a step on prevents a collision, by its number and the step."""
         games, steps = np.array(braked, dtype=np.int64).reshape(-1, 2).T
-        courses = self._courses(_Replays(games, steps, np.zeros_like(games)), [FullBraking(self._car)])
+        courses = self._courses(_Replays(games, steps, np.zeros_like(games)), [FullBraking(self._scene.world)])
         return {key: course is not None for key, course in zip(braked, courses, strict=True)}
 
     def _danger_steps(self, driver: ReferenceDriver, observations: FloatArray) -> IntArray:

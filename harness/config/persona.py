@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator,
 
 from harness.config.scene import Name
 from harness.config.toml_reading import NUMBER, TABLE, Document, Mistakes, nearest, one_of, ordered
-from harness.game.human_factors import ActuatorShares, HumanFactors, Reaction, Sight
+from harness.game.human_factors import ActuatorShares, HumanFactors, Sight
 from harness.game.lapses import Attention, Controls
 from harness.game.payoff import FuzzyFunction, FuzzySet, Payoff, Weighted
 from harness.game.payoff_terms import FUZZY_QUANTITIES, GROUPS, NEARNESS, TERMS
@@ -295,7 +295,7 @@ class Persona(Document):
         return HumanFactors(
             attention=Attention(**_given(self.attention)) if self.attention else None,
             sight=Sight(**_given(self.perception)),
-            reaction=Reaction(**_given(self.reaction)),
+            delay_s=self.reaction.delay_s,
             actuator_shares=ActuatorShares(**_given(self.actuators)),
         )
 

@@ -102,7 +102,7 @@ def read_document(path: str | Path, model: type[D]) -> D:
     try:
         text = content_of(path, MOST_BYTES).decode("utf-8")
     except FileNotFoundError:
-        raise UsageError.of(path, "", "there is no such file", _similar_file(path)) from None
+        raise UsageError.of(path, "", "there is no such file", nearest_beside(path)) from None
     except OSError as error:
         raise UsageError.of(path, "", f"cannot be read: {error.strerror}", remedy) from None
     except UnicodeDecodeError as error:
@@ -135,6 +135,13 @@ def nearest(word: str, words: Iterable[str]) -> str:
         return f"did you mean {close!r}?"
     more = f" and {len(words) - _NAMES_SHOWN} more" if len(words) > _NAMES_SHOWN else ""
     return f"valid: {', '.join(words[:_NAMES_SHOWN])}{more}"
+
+
+def nearest_beside(path: Path) -> str:
+    """A remedy for a path that leads nowhere: the nearest name in its folder."""
+    if not path.parent.is_dir():
+        return f"there is no folder {path.parent}"
+    return nearest(path.name, [each.name for each in path.parent.iterdir()] or ["(its folder is empty)"])
 
 
 def one_of(words: Iterable[str], otherwise: str) -> AfterValidator:
@@ -192,9 +199,3 @@ def _model_in(annotation: Any) -> Any:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     return next((model for each in get_args(annotation) if (model := _model_in(each))), None)
-
-
-def _similar_file(path: Path) -> str:
-    if not path.parent.is_dir():
-        return f"there is no folder {path.parent}"
-    return nearest(path.name, [each.name for each in path.parent.iterdir()] or ["(an empty folder)"])

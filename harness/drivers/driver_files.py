@@ -9,7 +9,7 @@ from pathlib import Path
 
 from harness.config.campaign import resolve
 from harness.config.driver import Onnx, Process, Python, WithFiles
-from harness.config.toml_reading import nearest
+from harness.config.toml_reading import nearest_beside
 from harness.drivers.onnx_network import external_files
 from harness.errors import UsageError
 from harness.files import digest_of_file
@@ -62,12 +62,6 @@ def is_file(folder: Path, written: str) -> bool:
         return resolve_in(folder, written).is_file()
     except (OSError, ValueError):
         return False
-
-
-def nearest_beside(path: Path) -> str:
-    """A remedy for a path that leads nowhere: the nearest name in its folder."""
-    names = [each.name for each in path.parent.iterdir()] if path.parent.is_dir() else []
-    return nearest(path.name, names or ["(its folder is empty)"])
 
 
 def sha256_of(path: Path) -> str:

@@ -29,18 +29,10 @@ from harness.config.driver import (
     WithFiles,
     read_driver,
 )
-from harness.config.toml_reading import nearest
+from harness.config.toml_reading import nearest, nearest_beside
 from harness.config.tunable import Adjustable, Tunable
 from harness.drivers.car import Car
-from harness.drivers.driver_files import (
-    files_of,
-    find_program,
-    is_file,
-    nearest_beside,
-    relative_to,
-    resolve_in,
-    sha256_of,
-)
+from harness.drivers.driver_files import files_of, find_program, is_file, relative_to, resolve_in, sha256_of
 from harness.drivers.driver_kinds import driver_in_words, make_driver
 from harness.drivers.entry_points import entry_point, installed_names, version_of
 from harness.drivers.fmu import unconnected_inputs
@@ -208,7 +200,7 @@ def find_driver(written: str, file: Path, key: str, allow_code: bool) -> Externa
             raise UsageError.of(place, "kind", f"this driver {runs}; a document can't give the permission", remedy)
         return _from_document(written, place, document)
     if "/" in written or place.suffix.lower() in {".toml", *ARCHIVES}:
-        remedy = nearest_beside(place) if os.path.isdir(place.parent) else f"no folder {place.parent}"
+        remedy = nearest_beside(place)
         if is_name(written, "policies"):
             remedy += f"; {_shipped_policies_as(written)}"
         raise UsageError.of(file, key, f"{written!r}: there is no such file or folder", remedy)

@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from harness.config.rule_driver import CarefulAndCompetent, Cruise, FuzzySafety, Rss, Rules
-from harness.drivers.car import Car
+from harness.drivers.car import Car, car_of
 from harness.drivers.rules_driver import RulesDriver
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.roles import EGO
@@ -28,8 +28,9 @@ _DESCRIPTION = "A reference driver, which judges whether a failure could have be
 _USUAL_LANE_M = (2.0, 5.0)
 
 
-def reference_driver(name: str, car: Car, lane_width_m: float) -> ReferenceDriver:
-    """A reference driver of `REFERENCES` for a car, on a road with lanes of this width."""
+def reference_driver(name: str, world: World) -> ReferenceDriver:
+    """A reference driver of `REFERENCES` for the ego of a world."""
+    car, lane_width_m = car_of(world, EGO), lane_width_of(world)
     if name == UPPER_BOUND:
         return StrongestBraking(car, [RulesDriver(reference_rules(each, lane_width_m), car) for each in PERSONS])
     return RulesDriver(reference_rules(name, lane_width_m), car)
@@ -93,8 +94,8 @@ ReferenceDriver: TypeAlias = RulesDriver | StrongestBraking
 class FullBraking(StrongestBraking):
     """Keeps its lane and brakes as hard as tyres and brakes allow, until the car stands."""
 
-    def __init__(self, car: Car) -> None:
-        super().__init__(car, [])
+    def __init__(self, world: World) -> None:
+        super().__init__(car_of(world, EGO), [])
 
     def sees_danger(self, observation: FloatArray) -> BoolArray:
         """[N] true: it brakes in every step."""

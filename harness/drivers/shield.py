@@ -15,7 +15,7 @@ import numpy as np
 from harness.config.rule_driver import Rss
 from harness.drivers.car import car_of
 from harness.drivers.protocol import Driver
-from harness.drivers.reference_drivers import lane_width_of, reference_driver
+from harness.drivers.reference_drivers import reference_driver
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.bicycle import GRAVITY_MPS2
 from harness.game.roles import EGO
@@ -32,7 +32,7 @@ class ShieldedDriver:
         self._world, self._car = world, car_of(world, EGO)
         self.wrapped = driver
         """The driver behind the shield."""
-        self._rule = reference_driver("rss", self._car, lane_width_of(world))
+        self._rule = reference_driver("rss", world)
         self._braking_mps2 = Rss().full_braking_g * GRAVITY_MPS2
         self.intervenes: BoolArray = np.zeros(0, dtype=bool)
         """By game: whether its last decision was changed."""

@@ -14,12 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from harness.drivers.protocol import Planner, planner_of
 from harness.environments.cartesian_views import CartesianViews
 from harness.environments.knowledge import Knowledge
 from harness.environments.live_simulation import LiveSimulation
 from harness.environments.nearby_bodies import NearbyBodies
 from harness.environments.seats import Seat, taken_over, with_walkers
-from harness.environments.sumo_players import read_signals, read_sumo_players
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.bicycle import Requested, along_rail, move, requests, slide
 from harness.game.human_factors import PlayersLimits
@@ -177,9 +177,8 @@ class Arena(LiveSimulation):
         before, drove, sliding = self._placed
         state, world = self.state, self.world
         reading = self.reading = self.simulation.step()
-        read_signals(state, before, reading, world.step_s)
         self.signal_texts = list(reading.signal_texts or self.signal_texts)
-        read_sumo_players(state, reading, drove=drove, taken_over=self._taken_over, step_s=world.step_s)
+        reading.write_to(state, drove & ~self._taken_over, world.step_s)
         state.station_m, offset_m = world.road.routes.locate(state.x_m, state.y_m, before.station_m)
         quantities = self._quantities(state, before, offset_m)
         state.step = state.step + 1
@@ -196,7 +195,6 @@ class Arena(LiveSimulation):
         return Step(payoff=payoff, drove=drove, quantities=quantities, observation=observation)
 
     def close(self) -> None:
-        """Close the SUMO simulation."""
         self.simulation.close()
 
     # --- the parts of a step -------------------------------------------------------------------------------------
@@ -211,8 +209,8 @@ class Arena(LiveSimulation):
             games = np.flatnonzero(plays)
             if seat.driver is not None and seat.driver.takes_over and len(games):
                 noise = self._noise[games, player, now[games]]
-                if self._views.plans(seat.driver):
-                    self._show(seat, player, games)
+                if (planner := planner_of(seat.driver)) is not None:
+                    self._show(planner, player, games)
                 decided = seat.driver.decide(games, self.observation[games, player], noise)
                 of = f"{self.world.roles[player]}, {type(seat.driver).__name__},"
                 chosen[games, player] = checked_decisions(decided, of, games, state.step)
@@ -292,12 +290,12 @@ class Arena(LiveSimulation):
     def _observed(self, quantities: Quantities, games: IntArray, *, advance: bool = False) -> FloatArray:
         return self.knowledge.observations(quantities, self.state.step, self.reading, games, advance=advance)
 
-    def _show(self, seat: Seat, player: int, games: IntArray) -> None:
-        """Show the planner on a seat what its player sees in games [N]; the players' ways do not matter for it."""
+    def _show(self, planner: Planner, player: int, games: IntArray) -> None:
+        """Show a planner what its player sees in games [N]; the players' ways do not matter for it."""
         state = self.state.of(games)
         quantities = self._quantities(state, state, np.zeros(state.x_m.shape), games)
         known = self.knowledge.seen(quantities, self.state.step, self.reading, games)
-        self._views.show(seat.driver, player, games, (quantities, known, self.reading))
+        self._views.show(planner, player, games, (quantities, known, self.reading))
 
     # --- observations ------------------------------------------------------------------------------------
 

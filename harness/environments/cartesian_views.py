@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from harness.drivers.protocol import Driver, Planner, planner_of
+from harness.drivers.protocol import Planner
 from harness.environments.nearby_bodies import NearbyBodies
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.cartesian_view import SIGNAL_STATES, CartesianView, SeenObject, SeenSignal
@@ -40,15 +40,6 @@ class _Named(NamedTuple):
     kind: str
     driven_by_sumo: str | None
     """Its name in the simulation; None: the harness moves it, it walks or it stands."""
-
-
-class _Sighting(NamedTuple):
-    """What a player takes a body to do: its place relative to the player's own, its heading and its velocity."""
-
-    dx_m: float
-    dy_m: float
-    heading_rad: float
-    velocity_mps: tuple[float, float]
 
 
 @dataclass
@@ -80,17 +71,12 @@ class CartesianViews:
         for key in [each for each in self._memories if each[0] in games]:
             del self._memories[key]
 
-    def plans(self, driver: Driver | None) -> bool:
-        """Whether a driver is a planner now, or holds one."""
-        return planner_of(driver) is not None
-
     def show(
-        self, driver: Driver | None, player: int, games: IntArray, there: tuple[Quantities, Seen, Reading | None]
+        self, planner: Planner, player: int, games: IntArray, there: tuple[Quantities, Seen, Reading | None]
     ) -> None:
-        """Show the planner in a driver what its player sees in games [N], by their quantities, what the players take
-        the bodies to be, and the reading of all games."""
-        planner, (quantities, known, reading) = planner_of(driver), there
-        assert planner is not None, "only planners are shown something"
+        """Show a planner what its player sees in games [N], by their quantities, what the players take the bodies to
+        be, and the reading of all games."""
+        quantities, known, reading = there
         sights = _Sights(
             games=games,
             state=quantities.state,
@@ -140,8 +126,8 @@ class CartesianViews:
         objects = []
         for body, each in zip(bodies, named, strict=True):
             number = memory.numbers.setdefault(each.key, len(memory.numbers))
-            sighting, before = sights.sighting(row, player, body), memory.before.get(number)
-            (vx, vy), step_s = sighting.velocity_mps, self._scene.world.step_s
+            before, step_s = memory.before.get(number), self._scene.world.step_s
+            x_m, y_m, heading_rad, vx, vy = sights.sighting(row, player, body)
             ax, ay = (
                 ((vx - before.velocity_x_mps) / step_s, (vy - before.velocity_y_mps) / step_s) if before else (0.0, 0.0)
             )
@@ -149,9 +135,9 @@ class CartesianViews:
                 SeenObject(
                     id=number,
                     kind=each.kind,
-                    x_m=float(sights.state.x_m[row, player]) + sighting.dx_m,
-                    y_m=float(sights.state.y_m[row, player]) + sighting.dy_m,
-                    heading_rad=_wrapped(sighting.heading_rad),
+                    x_m=x_m,
+                    y_m=y_m,
+                    heading_rad=_wrapped(heading_rad),
                     length_m=float(sights.bodies.length_m[row, body]),
                     width_m=float(sights.bodies.width_m[row, body]),
                     velocity_x_mps=vx,
@@ -199,18 +185,18 @@ class _Sights:
     driven_by_sumo: BoolArray
     """[N, P] players that SUMO drives now."""
 
-    def sighting(self, row: int, player: int, body: int) -> _Sighting:
-        """What a player takes a body to do: errors scale its distance, and add a velocity along the line of sight."""
+    def sighting(self, row: int, player: int, body: int) -> tuple[float, float, float, float, float]:
+        """Place (x, y), heading and velocity (x, y) of a body as a player takes them to be: errors scale its distance,
+        and add a velocity along the line of sight."""
         state = self.state
         x_m, y_m, heading_rad, speed_mps = self.perceived[:, row, player, body].tolist()
-        dx_m, dy_m = x_m - float(state.x_m[row, player]), y_m - float(state.y_m[row, player])
+        own_x_m, own_y_m = float(state.x_m[row, player]), float(state.y_m[row, player])
+        dx_m, dy_m = x_m - own_x_m, y_m - own_y_m
         further = 1.0 + float(state.distance_error[row, player])
         closing_per_s = float(state.closing_error_per_s[row, player])
-        velocity_mps = (
-            speed_mps * float(np.cos(heading_rad)) + closing_per_s * dx_m,
-            speed_mps * float(np.sin(heading_rad)) + closing_per_s * dy_m,
-        )
-        return _Sighting(further * dx_m, further * dy_m, heading_rad, velocity_mps)
+        vx_mps = speed_mps * float(np.cos(heading_rad)) + closing_per_s * dx_m
+        vy_mps = speed_mps * float(np.sin(heading_rad)) + closing_per_s * dy_m
+        return own_x_m + further * dx_m, own_y_m + further * dy_m, heading_rad, vx_mps, vy_mps
 
 
 def _wrapped(heading_rad: FloatArray | float) -> float:

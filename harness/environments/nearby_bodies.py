@@ -7,7 +7,7 @@ import numpy as np
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.initial_state import InitialState
 from harness.game.placed_obstacles import Obstacles
-from harness.game.state import Bodies, State
+from harness.game.state import Bodies, State, nearest_to_players
 from harness.game.world import World
 from harness.sumo.simulation import Reading
 
@@ -38,7 +38,7 @@ class NearbyBodies:
         sizes_m = (self._length_m[games], self._width_m[games])
         bodies = Bodies(*pose, state.speed_mps, *sizes_m, state.present.copy())
         if reading is not None and reading.present.size:
-            bodies = bodies.with_nearest(Bodies(*(getattr(reading, name)[games] for name in Bodies._fields)))
+            bodies = bodies.with_nearest(_bodies_in(reading, games))
         if not self._obstacles.each:
             return bodies
         standing = (*np.moveaxis(self.poses[games], -1, 0), *(each[games] for each in self._at_rest))
@@ -52,13 +52,11 @@ class NearbyBodies:
         if not between:
             return [[*self._roles, *last]] * len(games)
         assert reading is not None, "it has the bodies between players and obstacles"
-        found, first = list[list[str]](), len(self._roles)
-        for row, game in enumerate(games.tolist()):
-            there = np.flatnonzero(reading.present[game])
-            places_m = zip(reading.x_m[game, there].tolist(), reading.y_m[game, there].tolist(), strict=True)
-            by_place = dict(zip(places_m, reading.names[game, there].tolist(), strict=True))
-            own = slice(first, first + between)
-            columns = (bodies.x_m[row, own].tolist(), bodies.y_m[row, own].tolist(), bodies.present[row, own].tolist())
-            others = (by_place[x_m, y_m] if present else "" for x_m, y_m, present in zip(*columns, strict=True))
-            found.append([*self._roles, *others, *last])
-        return found
+        players = Bodies._make(each[:, : len(self._roles)] for each in bodies)
+        nearest, present = nearest_to_players(_bodies_in(reading, games), players)
+        others = np.where(present, np.take_along_axis(reading.names[games], nearest, 1), "")
+        return [[*self._roles, *names, *last] for names in others.tolist()]
+
+
+def _bodies_in(reading: Reading, games: IntArray | slice) -> Bodies:
+    return Bodies(*(getattr(reading, name)[games] for name in Bodies._fields))

@@ -103,5 +103,4 @@ class Window:
         self._plt.pause(max(pause_s, 1e-3))
 
     def close(self) -> None:
-        """Close the window."""
         self._plt.close(self._figure)

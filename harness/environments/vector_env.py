@@ -173,7 +173,6 @@ class ArenaVecEnv(GamesVecEnv):
         self.arena.reload(seed)
 
     def close(self) -> None:
-        """Close the SUMO simulation."""
         self.arena.close()
 
     def _finish(self, game: int) -> None:

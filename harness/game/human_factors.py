@@ -17,6 +17,7 @@ estimated as s exp(V w), and the error of a closing speed is s sigma w'. V is `d
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -48,20 +49,15 @@ class Sight:
     closing_error_per_s: float = 0.0
 
 
-@dataclass(frozen=True, kw_only=True)
-class Reaction:
-    """The delay with which the motion of the other players is perceived: the range of a draw for each game, uniform."""
-
-    delay_s: tuple[float, float] = (0.0, 0.0)
-
-
-@dataclass(frozen=True, kw_only=True)
-class ActuatorShares:
+class ActuatorShares(NamedTuple):
     """Shares of the car's acceleration, braking and steering that the driver uses at full pedals and wheel."""
 
     throttle_share: float = 1.0
     braking_share: float = 1.0
     steering_share: float = 1.0
+
+
+FULL_USE = ActuatorShares()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,8 +66,9 @@ class HumanFactors:
 
     attention: Attention | None = None
     sight: Sight = Sight()
-    reaction: Reaction = Reaction()
-    actuator_shares: ActuatorShares = ActuatorShares()
+    delay_s: tuple[float, float] = (0.0, 0.0)
+    """The range of the reaction time, after which the motion of other players is perceived: uniform, for each game."""
+    actuator_shares: ActuatorShares = FULL_USE
 
     @property
     def with_open_eyes(self) -> HumanFactors:
@@ -93,8 +90,7 @@ class Limits:
     field_of_view_rad: float = np.inf
     estimation_errors: FloatArray | None = None
     """[T, 2] errors of estimated distances (share of the distance) and closing speeds (per second of distance)."""
-    actuator_shares: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    """Shares of throttle, brake and wheel."""
+    actuator_shares: ActuatorShares = FULL_USE
 
 
 NO_LIMITS = Limits()
@@ -156,7 +152,7 @@ class PlayersLimits:
         state.distance_error[game, player], state.closing_error_per_s[game, player] = first
         self.delays |= limits.delay_steps > 0
         self.misjudges |= errors is not None
-        self.spares |= limits.actuator_shares != NO_LIMITS.actuator_shares
+        self.spares |= limits.actuator_shares != FULL_USE
 
     def end_glances(self, state: State, leader_ttc_s: FloatArray) -> None:
         """End the glances of players that notice by peripheral sight that they close in on the vehicle ahead, from the

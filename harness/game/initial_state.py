@@ -15,11 +15,10 @@ import numpy as np
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.follower import Follower, OrdinaryDriver, draw_follower
 from harness.game.human_factors import (
+    FULL_USE,
     NO_LIMITS,
-    ActuatorShares,
     HumanFactors,
     Limits,
-    Reaction,
     Sight,
     autocorrelated,
     draw_estimation_errors,
@@ -32,7 +31,7 @@ from harness.game.seeding import between, drawn_index, generator_of, parts_of, s
 from harness.game.start_range import StartRange, draw_along_route, poses_of, starts_in
 from harness.game.world import World
 
-_UNLIMITED = (Reaction(), Sight(), ActuatorShares())
+_UNLIMITED = ((0.0, 0.0), Sight(), FULL_USE)
 
 
 HAND_PERSISTENCE_S = 0.5
@@ -95,9 +94,8 @@ class StartDistribution:
 
     Players that do not take part in every game take part in the same games, as far as their probabilities are equal.
     A player may have several drivers. Each game draws one of them by the `shares`, with its human factors.
-    In `along_route_share` of the games, the players start anywhere along their routes instead, up to their goals.
-    With `meet_in_place` they do so only in games of a player alone. In `followed_share` of the games, somebody follows
-    the ego.
+    In `along_route_share` of the games of a player alone, it starts anywhere along its route instead, up to its goal.
+    In `followed_share` of the games, somebody follows the ego.
     """
 
     world: World
@@ -110,7 +108,6 @@ class StartDistribution:
     limit_share: tuple[float, float] = (1.0, 1.0)
     signal_place: tuple[float, float] = (0.0, 1.0)
     along_route_share: float = 0.0
-    meet_in_place: bool = False
     followed_share: float = 0.0
     obstacles: Obstacles = NO_OBSTACLES
 
@@ -144,7 +141,7 @@ def draw_initial_state(starts: StartDistribution, *parts: str | int) -> InitialS
     x, y, heading = poses_of(starts.places, positions_m, world.length_m)
     positions, speeds = np.array(positions_m), np.array(speeds_mps)
     stations = positions - 0.5 * world.length_m
-    if starts.along_route_share and not (starts.meet_in_place and sum(present) > 1):
+    if starts.along_route_share and sum(present) == 1:
         along = draw_along_route(
             world.road.routes,
             generator_of(*parts, "along route"),
@@ -208,23 +205,23 @@ def member_in_episode(shares: Sequence[float], player: int, seed: int, episode: 
 
 def _limits(human_factors: HumanFactors, starts: StartDistribution, player: int, *parts: str | int) -> Limits:
     """The limits of a player. Each limit has its own generator, which is made only if the limit exists."""
-    reaction, sight, shares = human_factors.reaction, human_factors.sight, human_factors.actuator_shares
-    if (reaction, sight, shares) == _UNLIMITED:  # common, and much faster than the rest
+    delay_s, sight, shares = human_factors.delay_s, human_factors.sight, human_factors.actuator_shares
+    if (delay_s, sight, shares) == _UNLIMITED:  # common, and much faster than the rest
         return NO_LIMITS
 
     def generator(name: str) -> np.random.Generator:
         return generator_of(*parts, name, player)
 
-    delay_s = generator("reaction").uniform(*reaction.delay_s) if any(reaction.delay_s) else 0.0
+    drawn_s = generator("reaction").uniform(*delay_s) if any(delay_s) else 0.0
     failing = sight.looked_but_failed_to_see_share
     fails_to_see = bool(failing) and generator("missing").random() < failing
     errors = None
     if sight.distance_error or sight.closing_error_per_s:
         errors = draw_estimation_errors(sight, starts.world.steps, starts.world.step_s, generator("sight"))
     return Limits(
-        delay_steps=round(delay_s / starts.world.step_s),
+        delay_steps=round(drawn_s / starts.world.step_s),
         sight_m=min(sight.range_m, sight.noticed_within_m) if fails_to_see else sight.range_m,
         field_of_view_rad=float(np.deg2rad(sight.field_of_view_deg)),
         estimation_errors=errors,
-        actuator_shares=(shares.throttle_share, shares.braking_share, shares.steering_share),
+        actuator_shares=shares,
     )

@@ -22,8 +22,8 @@ from harness.game.memory import Perceived
 from harness.game.perception_errors import (
     LOSS,
     MOST_GHOSTS,
-    NO_GHOSTS,
     SPEED,
+    Ghost,
     PerceptionErrors,
     X,
     Y,
@@ -73,8 +73,7 @@ class ObjectLists:
         self._listed: BoolArray = np.zeros((kept, games, _ROOM), dtype=bool)
         self._names = [dict[str, int]() for _ in range(games)]
         self._parts = [tuple[str | int, ...]() for _ in range(games)]
-        self._ghosts = [NO_GHOSTS] * games
-        self._next_ghost = np.tile((0, steps + 1), (games, 1))  # its number in the plan, and its first step
+        self._drawn_ghosts = [dict[int, list[Ghost]]() for _ in range(games)]  # by the step in which they appear
         self._ghost: FloatArray = np.zeros((games, MOST_GHOSTS, 5))
         """x_m, y_m, heading_rad, speed_mps, and the step in which it goes."""
 
@@ -86,8 +85,7 @@ class ObjectLists:
         self._listed[:, game] = False
         self._ghost[game] = 0.0
         if self._errors.ghosts is not None:
-            self._ghosts[game] = draw_ghosts(self._errors.ghosts, self._steps, self._sensing.step_s, *parts)
-            self._next_ghost[game] = 0, self._first_step(game, 0)
+            self._drawn_ghosts[game] = draw_ghosts(self._errors.ghosts, self._steps, self._sensing.step_s, *parts)
 
     def advance(self, q: Quantities, names: Sequence[Sequence[str]], games: IntArray) -> None:
         """Objects of games [N] are lost and found, and ghosts appear. Once per step. `names` [N][B] are those of the
@@ -149,26 +147,13 @@ class ObjectLists:
         heading_rad, moved_m = self._ghost[games, :, 2], self._sensing.step_s * self._ghost[games, :, 3]
         self._ghost[games, :, 0] += moved_m * np.cos(heading_rad)
         self._ghost[games, :, 1] += moved_m * np.sin(heading_rad)
-        for row in np.flatnonzero(self._next_ghost[games, 1] <= q.state.step).tolist():
-            game = int(games[row])
-            while self._next_ghost[game, 1] <= q.state.step[row]:
-                number = int(self._next_ghost[game, 0])
-                self._appear(game, number, q, row)
-                self._next_ghost[game] = number + 1, self._first_step(game, number + 1)
-
-    def _first_step(self, game: int, number: int) -> int:
-        """When a ghost of the plan appears; after the game where there are no more."""
-        first_steps = self._ghosts[game].first_step
-        return int(first_steps[number]) if number < len(first_steps) else self._steps + 1
-
-    def _appear(self, game: int, number: int, q: Quantities, row: int) -> None:
-        plan, state = self._ghosts[game], q.state
-        ahead_m, left_m, speed_mps = plan.pose[number]
-        heading_rad = state.heading_rad[row, EGO]
-        cosine, sine = np.cos(heading_rad), np.sin(heading_rad)
-        x_m = state.x_m[row, EGO] + ahead_m * cosine - left_m * sine
-        y_m = state.y_m[row, EGO] + ahead_m * sine + left_m * cosine
-        self._ghost[game, int(plan.place[number])] = x_m, y_m, heading_rad, speed_mps, plan.end_step[number]
+        for row, (game, step) in enumerate(zip(games.tolist(), q.state.step.tolist(), strict=True)):
+            for ghost in self._drawn_ghosts[game].get(step, ()):
+                heading_rad = q.state.heading_rad[row, EGO]
+                cosine, sine = np.cos(heading_rad), np.sin(heading_rad)
+                x_m = q.state.x_m[row, EGO] + ghost.ahead_m * cosine - ghost.left_m * sine
+                y_m = q.state.y_m[row, EGO] + ghost.ahead_m * sine + ghost.left_m * cosine
+                self._ghost[game, ghost.place] = x_m, y_m, heading_rad, ghost.speed_mps, ghost.end_step
 
     def _with_ghosts(self, seen: Seen, q: Quantities, games: IntArray) -> Seen:
         """The same with the ghosts after the bodies, which the ego alone sees. No rule gives a ghost priority."""

@@ -11,6 +11,7 @@ The random numbers of an object hang on the game and on the object's name alone,
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -67,18 +68,14 @@ class PerceptionErrors:
     ghosts: GhostRates | None = None
 
 
-@dataclass(frozen=True)
-class GhostPlan:
-    """The ghosts of a game, each in one of `MOST_GHOSTS` places. Arrays are [N]."""
+class Ghost(NamedTuple):
+    """A ghost, which has one of `MOST_GHOSTS` places."""
 
-    place: FloatArray
-    first_step: FloatArray
-    end_step: FloatArray
-    pose: FloatArray
-    """[N, 3] ahead_m and left_m of the ego in the first step, and speed_mps."""
-
-
-NO_GHOSTS = GhostPlan(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros((0, 3)))
+    place: int
+    end_step: int
+    ahead_m: float  # of the ego, when it appears
+    left_m: float
+    speed_mps: float
 
 
 def draw_object(errors: PerceptionErrors, steps: int, step_s: float, name: str, *parts: str | int) -> FloatArray:
@@ -90,9 +87,10 @@ def draw_object(errors: PerceptionErrors, steps: int, step_s: float, name: str, 
     return np.concatenate((uniform, autocorrelated(normal[:, :2], position), autocorrelated(normal[:, 2:], speed)), 1)
 
 
-def draw_ghosts(ghosts: GhostRates, steps: int, step_s: float, *parts: str | int) -> GhostPlan:
-    """Draw the ghosts of a game of `steps` steps. As many are there at its start as at any other time."""
-    generator, rows = generator_of(*parts, "perception", "ghosts"), list[list[float]]()
+def draw_ghosts(ghosts: GhostRates, steps: int, step_s: float, *parts: str | int) -> dict[int, list[Ghost]]:
+    """Draw the ghosts of a game of `steps` steps, by the step in which they appear. As many are there at its start as
+    at any other time."""
+    generator, drawn = generator_of(*parts, "perception", "ghosts"), dict[int, list[Ghost]]()
     free_from = [0] * MOST_GHOSTS
     time_s = -10.0 * ghosts.mean_lifetime_s  # those that appeared earlier have gone but for one in 20,000
     while ghosts.per_min > 0.0:
@@ -105,6 +103,5 @@ def draw_ghosts(ghosts: GhostRates, steps: int, step_s: float, *parts: str | int
         place = next((k for k, each in enumerate(free_from) if each <= first), None)
         if end > first and place is not None:
             free_from[place] = end
-            rows.append([place, first, end, *pose])
-    columns = np.array(rows).reshape(-1, 6)
-    return GhostPlan(columns[:, 0], columns[:, 1], columns[:, 2], columns[:, 3:])
+            drawn.setdefault(first, []).append(Ghost(place, end, *pose))
+    return drawn

@@ -11,7 +11,6 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations
 from math import atan2, hypot
 
 import numpy as np
@@ -23,8 +22,7 @@ from harness.game.roles import EGO
 from harness.game.seeding import between
 
 _BEFORE_GOAL_M = 10.0
-_APART_M = 6.0  # between the bumpers of two players, in any direction
-_CLEAR_WIDTH_M = 2.6  # of the way, `_APART_M` before and behind a car, that is free of obstacles
+_CLEAR_M, _CLEAR_WIDTH_M = 6.0, 2.6  # of the way before and behind a car that is free of obstacles
 _ATTEMPTS = 20
 _OFFSET_SD_M, _TURNED_SD_RAD = 0.2, 0.03  # from the centre of the lane, and from its direction
 
@@ -117,8 +115,8 @@ def draw_along_route(
 ) -> FloatArray | None:
     """[5, P] x_m, y_m, heading_rad, speed_mps and station_m of the centres of players of `length_m` [P].
 
-    None in 1 - `share` of the games, and if `_ATTEMPTS` draws have no place for all that are `present` [P], apart from
-    one another and from the `obstacles` [O]. A lane and a station are drawn uniformly, the speed uniformly from 0 to
+    None in 1 - `share` of the games, and if `_ATTEMPTS` draws have no place apart from the `obstacles` [O] for those
+    that are `present` [P]. A lane and a station are drawn uniformly, the speed uniformly from 0 to
     the speed limit, or to the player's `max_speed_mps` [P] if that is less.
     """
     if generator.random() >= share:
@@ -126,7 +124,7 @@ def draw_along_route(
     for _ in range(_ATTEMPTS):
         drawn = [_draw(routes, each, (length_m[each], max_speed_mps[each]), generator) for each in range(len(length_m))]
         starts = np.array(drawn).T
-        if _apart(starts[0], starts[1], length_m, present) and _clear(starts, length_m, present, obstacles):
+        if _clear(starts, length_m, present, obstacles):
             return starts
     return None
 
@@ -150,18 +148,10 @@ def _draw(
     return x_m, y_m, heading_rad + turned_rad, speed_mps, station_m
 
 
-def _apart(x_m: FloatArray, y_m: FloatArray, length_m: FloatArray, present: BoolArray) -> bool:
-    there = np.flatnonzero(present).tolist()
-    return all(
-        np.hypot(x_m[one] - x_m[other], y_m[one] - y_m[other]) >= 0.5 * (length_m[one] + length_m[other]) + _APART_M
-        for one, other in combinations(there, 2)
-    )
-
-
 def _clear(starts: FloatArray, length_m: FloatArray, present: BoolArray, obstacles: Box) -> bool:
     """Whether no obstacle stands on the way just before, beside or behind a player that is present."""
     ways = [
-        Box(x_m, y_m, heading_rad, own_m + 2.0 * _APART_M, _CLEAR_WIDTH_M)
+        Box(x_m, y_m, heading_rad, own_m + 2.0 * _CLEAR_M, _CLEAR_WIDTH_M)
         for x_m, y_m, heading_rad, own_m in zip(*starts[:3, present].tolist(), length_m[present].tolist(), strict=True)
     ]
     return all(box_distance(way, box) > 0.0 for way in ways for box in boxes_of(obstacles))

@@ -26,6 +26,7 @@ from harness.road.net.network import car_lanes, is_for_cars, lane_line
 from harness.road.net.right_of_way_table import foes_of, overlap_of, yields_to
 from harness.road.net.route_table import line_over_junction
 from harness.road.net.stream import Feeders, Stream
+from harness.road.net.surface import unit
 
 _OPPOSITE = -0.7  # cosine of the angle between two approaches that come towards each other
 _STRAIGHT = 0.87  # of the angle by which a way over a junction turns
@@ -271,15 +272,12 @@ def following(net: Net) -> Iterator[Candidate]:
 @lru_cache(maxsize=64)
 def _into(link: Connection) -> FloatArray:
     """[2] the unit direction in which a connection enters its junction."""
-    return _direction(lane_line(link.getFromLane())[-2:])
+    before, end = lane_line(link.getFromLane())[-2:]
+    return unit(end - before)
 
 
 @lru_cache(maxsize=64)
 def _out(link: Connection) -> FloatArray:
     """[2] the unit direction in which it leaves the junction."""
-    return _direction(lane_line(link.getToLane())[:2])
-
-
-def _direction(segment: FloatArray) -> FloatArray:
-    vector = segment[1] - segment[0]
-    return np.asarray(vector / max(float(np.hypot(*vector)), 1e-9))
+    begin, behind = lane_line(link.getToLane())[:2]
+    return unit(behind - begin)

@@ -15,7 +15,7 @@ import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.follower import OrdinaryDriver
-from harness.game.geometry import Box, box_distance, boxes_of
+from harness.game.geometry import Box, box_distance
 from harness.game.initial_state import InitialState
 from harness.game.roles import EGO
 from harness.road.demand.route_file import SHARE, Departure, Motion
@@ -194,9 +194,7 @@ def with_follower(
     assert follower.motion is not None, "it drives already"
     if np.delete(_near(follower.motion, start, length_m), EGO).any():
         return list(departures)
-    way = _way(follower.motion)
-    free = [each for each in departures if each.motion is None or box_distance(_way(each.motion), way) > 0.0]
-    return [follower, *free]
+    return [follower, *clear_of(departures, [_way(follower.motion)])]
 
 
 def _near(motion: Motion, start: InitialState, length_m: FloatArray) -> BoolArray:
@@ -212,9 +210,8 @@ def _near(motion: Motion, start: InitialState, length_m: FloatArray) -> BoolArra
     return near
 
 
-def clear_of_obstacles(departures: Sequence[Departure], obstacles: Box) -> list[Departure]:
-    """The departures without vehicles of a warm-up that are on an obstacle, or would have to brake hard before it."""
-    boxes = boxes_of(obstacles)
+def clear_of(departures: Sequence[Departure], boxes: Sequence[Box]) -> list[Departure]:
+    """The departures without vehicles of a warm-up that are on one of the boxes, or would brake hard before it."""
     return [
         each
         for each in departures

@@ -24,6 +24,7 @@ from libsumo import _libsumo  # the same functions without Python wrappers, for 
 
 from harness.errors import SimulationError
 from harness.game.arrays import FloatArray
+from harness.game.geometry import boxes_of
 from harness.game.initial_state import InitialState
 from harness.game.roles import EGO
 from harness.road.demand.route_file import Departure
@@ -33,7 +34,7 @@ from harness.sumo.background_traffic import BackgroundTraffic
 from harness.sumo.insertion import (
     Insertion,
     StandingVehicles,
-    clear_of_obstacles,
+    clear_of,
     clear_of_players,
     drive_as,
     with_follower,
@@ -120,7 +121,7 @@ class LibsumoSimulation(Simulation):
                 self._add_player(game, player, start)
             if self._standing is not None:
                 self._standing.reset(game, *start.parts)
-                departures = clear_of_obstacles(departures, self._scene.obstacles.boxes(*start.parts))
+                departures = clear_of(departures, boxes_of(self._scene.obstacles.boxes(*start.parts)))
             background = self._background.reset(game, departures)
             if self._speed_limits is not None:
                 self._speed_limits.reset(game, start.limit_share)

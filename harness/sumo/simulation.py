@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.initial_state import InitialState
 from harness.game.jit import compiled
+from harness.game.state import Bodies, State
+from harness.game.traffic_rules import since_change_s
 from harness.road.demand.route_file import Departure
 from harness.road.net.levels import on_players_level
 
@@ -45,6 +47,19 @@ class Reading:
     """[G] the whole states of the traffic lights on the players' routes, as `id=state` separated by spaces, if games
     are recorded."""
 
+    def write_to(self, state: State, driven: BoolArray, step_s: float) -> None:
+        """Write the signals, and the motion of the players that SUMO drives, `driven` [G, P], to the state of the step
+        before."""
+        if self.signals is not None:
+            state.signal_s = since_change_s(state.signals, self.signals, state.signal_s, step_s)
+            state.signals = self.signals
+        if self.players is not None and driven.any():
+            x_m, y_m, heading_rad, speed_mps = self.players[driven].T
+            gained_mps = np.where(state.step[np.nonzero(driven)[0]] > 0, speed_mps - state.speed_mps[driven], 0.0)
+            state.acceleration_mps2[driven] = gained_mps / step_s
+            state.x_m[driven], state.y_m[driven] = x_m, y_m
+            state.heading_rad[driven], state.speed_mps[driven] = heading_rad, speed_mps
+
 
 class AtReset(NamedTuple):
     """A game after a reset: states of signal links [L], seconds since they changed [L], the text of its lights, and the
@@ -59,7 +74,7 @@ class AtReset(NamedTuple):
 TURN_SIGNALS = ("off", "right", "left", "both")
 """By the two lowest bits of SUMO's vehicle signals, the right and the left indicator."""
 NO_SIGNALS = AtReset(np.zeros(0, dtype=np.int8), np.zeros(0), "")
-_OF_VEHICLES = ("names", "types", "x_m", "y_m", "heading_rad", "speed_mps", "length_m", "width_m", "present")
+_OF_VEHICLES = ("names", "types", *Bodies._fields)
 
 
 def with_game(reading: Reading | None, games: int, game: int, background: Reading) -> Reading:

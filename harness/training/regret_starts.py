@@ -22,9 +22,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from harness.drivers.car import car_of
 from harness.drivers.protocol import Driver
-from harness.drivers.reference_drivers import PERSONS, lane_width_of, reference_driver
+from harness.drivers.reference_drivers import PERSONS, reference_driver
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.initial_state import InitialState
 from harness.game.roles import EGO
@@ -140,9 +139,7 @@ def first_scores(spec: TrainingSpec) -> RegretScores | None:
     without replays. Raises as `Arena.step`, and SimulationError if SUMO can't load the scene."""
     if spec.best_known is None:
         return None
-    world = spec.scene.world
-    car, lane_width_m = car_of(world, EGO), lane_width_of(world)
-    drivers: list[Driver] = [*(reference_driver(each, car, lane_width_m) for each in PERSONS), spec.best_known]
+    drivers: list[Driver] = [*(reference_driver(each, spec.scene.world) for each in PERSONS), spec.best_known]
     with closing(PairedRollouts(spec.scene, pool_of(spec), games=POOL, at_once=spec.settings.games)) as games:
         payoffs, failed = zip(*map(games.play, drivers), strict=True)
     return scores_of(np.array(payoffs), np.array(failed))

@@ -141,8 +141,7 @@ def _start_distribution(spec: TrainingSpec, place: LearningPlace, steps: int) ->
         human_factors = [[replace(each, attention=None) for each in of_player] for of_player in human_factors]
     shares = [shares_of(each) for each in place.drivers]
     shares[place.player] = [1.0] * len(own)
-    starts = place.scene.start_distribution(human_factors, present, shares, ALONG_ROUTE_SHARE)
-    return replace(starts, meet_in_place=True)
+    return place.scene.start_distribution(human_factors, present, shares, ALONG_ROUTE_SHARE)
 
 
 def attentive_steps(spec: TrainingSpec) -> float:

@@ -19,7 +19,6 @@ from harness.config.ego_perception import EgoPerception
 from harness.config.persona import Persona
 from harness.config.scene import Varies
 from harness.config.toml_reading import read_document
-from harness.drivers.car import car_of
 from harness.drivers.mixture import mixture_of
 from harness.drivers.policy_file import LearnedDriver
 from harness.drivers.reference_drivers import REFERENCES, UPPER_BOUND, reference_driver
@@ -119,7 +118,7 @@ def side_by_side(assessed: SeatedArm, *batches: list[int]) -> list[str]:
 def test_batch__has_the_bytes_of_games_alone(scene: str, judged: bool, followed: bool) -> None:
     """SUMO drives the car that follows the ego in a part of the games. It draws no random numbers."""
     opened = open_scene(scene)
-    ego = reference_driver(UPPER_BOUND, car_of(opened.world, 0), 3.5) if judged else RANDOM
+    ego = reference_driver(UPPER_BOUND, opened.world) if judged else RANDOM
     assessed = arm(opened, ego, RANDOM, persona=TEXTING)
     alone = side_by_side(assessed, *([episode] for episode in range(5)))
     assert any("'follower'" in game for game in alone) == followed
@@ -170,7 +169,7 @@ def test_batch__has_the_bytes_of_games_alone_with_perception_errors() -> None:
 
 @pytest.mark.parametrize("ego", [RANDOM, "upper bound"])
 def test_batch__has_the_bytes_of_games_alone_with_a_shield(merge: OpenScene, ego: LearnedDriver | str) -> None:
-    driver = reference_driver(UPPER_BOUND, car_of(merge.world, 0), 3.5) if isinstance(ego, str) else ego
+    driver = reference_driver(UPPER_BOUND, merge.world) if isinstance(ego, str) else ego
     assessed = arm(merge, ShieldedDriver(driver, merge.world), RANDOM)
     alone = side_by_side(assessed, *([episode] for episode in range(6)))
     assert plays_side_by_side(assessed)
@@ -191,7 +190,7 @@ def test_batch__of_more_games_than_tiles(scene: str, monkeypatch: pytest.MonkeyP
 def test_arms__side_by_side_have_the_bytes_of_each_arm_alone(merge: OpenScene) -> None:
     """The arms have different drivers of the ego, with a reaction time and without, and share those of the person."""
     first = arm(merge, RANDOM, RANDOM, persona=TEXTING)
-    judges = [reference_driver(each, car_of(merge.world, 0), 3.5) for each in REFERENCES]
+    judges = [reference_driver(each, merge.world) for each in REFERENCES]
     egos = [mixture_of(judge, read_document(CAREFUL, Persona)) for judge in judges]
     arms = [first, *(replace(first, drivers=(ego, first.drivers[1])) for ego in egos)]
     alone = [side_by_side(each, *([episode] for episode in range(5))) for each in arms]

@@ -13,7 +13,7 @@ from harness.config.persona import Persona
 from harness.config.scene import Scene
 from harness.config.toml_reading import Document, nearest, read_document
 from harness.errors import Problem, UsageError
-from harness.game.human_factors import ActuatorShares, Reaction, Sight
+from harness.game.human_factors import ActuatorShares, Sight
 
 Write = Callable[[str], Path]
 
@@ -212,5 +212,5 @@ def test_persona__limits_survive_a_round_trip(write: Write) -> None:
     assert Persona.model_validate(written, strict=False) == person
     sight = Sight(range_m=50.0, field_of_view_deg=180.0, distance_error=0.1, closing_error_per_s=0.01)
     assert person.human_factors.sight == sight
-    assert person.human_factors.reaction == Reaction(delay_s=(0.2, 0.3))
+    assert person.human_factors.delay_s == (0.2, 0.3)
     assert person.human_factors.actuator_shares == ActuatorShares(braking_share=0.5)

@@ -9,7 +9,6 @@ import pytest
 
 from harness.config.driver import read_driver
 from harness.config.rule_driver import REACTIONS, Rules
-from harness.drivers.car import car_of
 from harness.drivers.reference_drivers import (
     PERSONS,
     UPPER_BOUND,
@@ -48,8 +47,7 @@ def test_identity__has_every_parameter() -> None:
 
 def test_upper_bound__brakes_fully_in_the_first_step_of_danger(merge: OpenScene) -> None:
     """A standing car 12 m ahead at 12 m/s is a danger to every driver; one 200 m ahead to none."""
-    car = car_of(merge.world, EGO)
-    drivers = {name: reference_driver(name, car, 3.2) for name in (*PERSONS, UPPER_BOUND)}
+    drivers = {name: reference_driver(name, merge.world) for name in (*PERSONS, UPPER_BOUND)}
     for ahead_m, danger in ((16.6, True), (150.0, False)):
         arena = Arena(merge, 1, [Seat(Steady()), Seat(Steady())])
         try:

@@ -18,7 +18,6 @@ from harness.game.human_factors import (
     HumanFactors,
     Limits,
     PlayersLimits,
-    Reaction,
     Sight,
     draw_estimation_errors,
     glances_over_shoulder,
@@ -107,7 +106,7 @@ def body_limits(straight: OpenScene, human_factors: HumanFactors, games: int) ->
 
 
 def test_reaction__is_drawn_from_its_range(straight: OpenScene) -> None:
-    late = HumanFactors(reaction=Reaction(delay_s=(0.3, 0.8)))
+    late = HumanFactors(delay_s=(0.3, 0.8))
     drawn = [each.delay_steps for each in body_limits(straight, late, 500)]
     assert set(drawn) == {3, 4, 5, 6, 7, 8}
     assert np.mean(drawn) == pytest.approx(5.5, abs=0.3)  # 4 standard errors of 1.44 / sqrt(500)
@@ -182,9 +181,9 @@ def test_failure_to_see__occurs_in_its_share_of_the_games(straight: OpenScene) -
 def test_open_eyes__remove_failures_to_see_and_keep_the_limits_of_the_body() -> None:
     failures = {"no_shoulder_glance_share": 0.5}
     failures |= {"looked_but_failed_to_see_share": 0.5, "noticed_within_m": 5.0}
-    late = Reaction(delay_s=(0.2, 0.4))
-    person = HumanFactors(reaction=late, sight=Sight(range_m=60.0, **failures))
-    assert person.with_open_eyes == HumanFactors(reaction=late, sight=Sight(range_m=60.0))
+    late = (0.2, 0.4)
+    person = HumanFactors(delay_s=late, sight=Sight(range_m=60.0, **failures))
+    assert person.with_open_eyes == HumanFactors(delay_s=late, sight=Sight(range_m=60.0))
 
 
 # --- actuator shares --------------------------------------------------------------------------------------------------

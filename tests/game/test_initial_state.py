@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harness.game.human_factors import HumanFactors, Reaction, Sight
+from harness.game.human_factors import HumanFactors, Sight
 from harness.game.initial_state import InitialState, StartDistribution, draw_initial_state
 from harness.game.lapses import Attention
 from harness.game.seeding import seed_of
@@ -57,9 +57,9 @@ def test_start__the_same_parts_give_the_same_start(start_distribution: StartDist
 
 def test_start__is_paired_for_all_human_factors(start_distribution: StartDistribution) -> None:
     """What differs in one player changes no draw of another, and no draw of its own that has other parts."""
-    late = replace(TEXTING, reaction=Reaction(delay_s=(0.2, 0.9)), sight=Sight(distance_error=0.1))
+    late = replace(TEXTING, delay_s=(0.2, 0.9), sight=Sight(distance_error=0.1))
     own, other = (replace(start_distribution, human_factors=([TEXTING], [each])) for each in (HumanFactors(), late))
-    slow = replace(start_distribution, human_factors=([TEXTING], [HumanFactors(reaction=late.reaction)]))
+    slow = replace(start_distribution, human_factors=([TEXTING], [HumanFactors(delay_s=late.delay_s)]))
     for episode in range(5):
         one = draw_initial_state(own, "a", episode)
         two = draw_initial_state(replace(other, present_share=(1.0, 0.0)), "a", episode)

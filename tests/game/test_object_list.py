@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from harness.game.memory import as_they_are
 from harness.game.object_list import ObjectLists
 from harness.game.observation import Seen, observe
-from harness.game.perception_errors import GhostRates, Noise, PerceptionErrors, draw_ghosts, draw_object
+from harness.game.perception_errors import Ghost, GhostRates, Noise, PerceptionErrors, draw_ghosts, draw_object
 from harness.game.quantities import Quantities
 from harness.road.scene.open_scene import OpenScene
 from tests.support.moments import FAR, Moment, car
@@ -165,7 +165,7 @@ def test_object_list__a_ghost_appears_beside_the_ego_and_goes_its_way(merge: Ope
     """The ego at (100, -1.6) heads east; the ghost appears 20 m ahead, 3 m to the left, and moves 0.2 m in a step."""
     made, q = lists(PerceptionErrors(ghosts=STANDS_THERE)), moment(merge.world, [car(100.0), FAR])
     plan = draw_ghosts(STANDS_THERE, STEPS, STEP_S, *PARTS)
-    of_plan = [(float(first), float(end)) for first, end in zip(plan.first_step, plan.end_step, strict=True)]
+    of_plan = [(first, ghost.end_step) for first, ghosts in plan.items() for ghost in ghosts]
     there = 0
     for step in range(STEPS):
         seen = look(made, q, step)
@@ -191,9 +191,9 @@ def test_object_list__a_ghost_is_an_object_without_priority(merge: OpenScene, mo
     assert with_ghost[0, 1].tobytes() == observe(q)[0, 1].tobytes()
 
 
-def started(made: ObjectLists) -> list[int]:
+def started(made: ObjectLists) -> list[Ghost]:
     """The ghosts that are there when the game starts."""
-    return [int(k) for k in np.flatnonzero(made._ghosts[0].first_step == 0)]
+    return made._drawn_ghosts[0].get(0, [])
 
 
 def test_object_list__as_many_ghosts_are_there_as_their_rate_and_lifetime_say() -> None:
@@ -201,9 +201,9 @@ def test_object_list__as_many_ghosts_are_there_as_their_rate_and_lifetime_say() 
     kind = replace(STANDS_THERE, per_min=120.0, mean_lifetime_s=0.5)
     counts = np.zeros(STEPS)
     for episode in range(300):
-        plan = draw_ghosts(kind, STEPS, 0.01, "episode", episode)
-        for first, end in zip(plan.first_step.astype(int), plan.end_step.astype(int), strict=True):
-            counts[first:end] += 1
+        for first, ghosts in draw_ghosts(kind, STEPS, 0.01, "episode", episode).items():
+            for ghost in ghosts:
+                counts[first : ghost.end_step] += 1
     assert counts / 300 == pytest.approx(np.ones(STEPS), abs=0.25)
 
 

@@ -20,7 +20,6 @@ from harness.campaign.plan.plan import plan
 from harness.campaign.preflight import open_campaign
 from harness.campaign.storage.run_folder import RunFolder
 from harness.drivers.sumo import SumoDriver
-from harness.environments.sumo_players import read_sumo_players
 from harness.errors import StageFailed, UsageError
 from harness.evaluation.measured_game import METRICS_OF_PLAYERS
 from harness.evaluation.metrics import Metric
@@ -36,6 +35,7 @@ from harness.game.sanity_checks import ImpossibleNumber, check_observation, chec
 from harness.game.state import Bodies, State
 from harness.road.scene.open_scene import OpenScene, open_scene
 from harness.sumo.libsumo_simulation import LibsumoSimulation
+from harness.sumo.simulation import Reading
 from tests.support.rollouts import Steady, arm, play, records
 from tests.support.scenes import build_scene
 from tests.support.tiny import PAPER_MERGE, write_campaign
@@ -203,12 +203,14 @@ def test_motion__a_car_that_the_harness_moves_follows_its_speed_to_a_millimetre(
 
 @pytest.mark.parametrize("name", ["x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad"])
 def test_motion__that_is_not_finite_is_named(name: str, merge: OpenScene, monkeypatch: pytest.MonkeyPatch) -> None:
-    def lose(state: State, *arguments: Any, **others: Any) -> None:
-        read_sumo_players(state, *arguments, **others)
+    write_to = Reading.write_to
+
+    def lose(reading: Reading, state: State, *arguments: Any) -> None:
+        write_to(reading, state, *arguments)
         if state.step[0] + 1 == STEP:
             getattr(state, name)[0, NON_EGO] = np.nan
 
-    monkeypatch.setattr("harness.environments.arena.read_sumo_players", lose)
+    monkeypatch.setattr(Reading, "write_to", lose)
     assert f"the motion of non_ego is not finite in step {STEP}: " in error_in(merge)
 
 

@@ -62,7 +62,7 @@ def opened(scene: OpenScene) -> Iterator[Open]:
 def test_bicycle__starts_anywhere_along_its_route(opened: Open) -> None:
     """SUMO refuses a vehicle whose speed exceeds what its type desires: 5.6 m/s here, at a maxSpeed of 8 m/s."""
     scene = open_scene(REPOSITORY / "networks" / "cyclist")
-    starts = scene.start_distribution([HumanFactors()] * 2, [1.0, 1.0], along_route_share=1.0)
+    starts = scene.start_distribution([HumanFactors()] * 2, [0.0, 1.0], along_route_share=1.0)
     drawn = [draw_initial_state(starts, "training", seed) for seed in range(20)]
     assert max(float(each.speed_mps[1]) for each in drawn) > 5.6
     assert all(each.speed_mps[1] <= 8.0 for each in drawn)

@@ -28,9 +28,8 @@ from harness.campaign.storage.arm_tables import arm_tables
 from harness.campaign.storage.checksums import intact_record, write_checksums
 from harness.campaign.storage.run_folder import JUDGED, TAKEN_OVER
 from harness.campaign.storage.versions import versions_of_numbers
-from harness.drivers.car import car_of
 from harness.drivers.mixture import mixture_of
-from harness.drivers.reference_drivers import REFERENCES, lane_width_of, reference_driver
+from harness.drivers.reference_drivers import REFERENCES, reference_driver
 from harness.evaluation.competence import broken_by
 from harness.evaluation.tables import table_of, write_csv
 from harness.evaluation.trace_file import TraceReader
@@ -147,8 +146,7 @@ def _from_start(
     folder = run.context.folder.segments(stage.id)
     make_folder(folder)
     seatless = PlayerFactory(context=run.context, scene=scene).arm(replace(stage.of, ego=(SumoDriven(),)))
-    car, lane_width_m = car_of(scene.world, EGO), lane_width_of(scene.world)
-    egos = [mixture_of(reference_driver(name, car, lane_width_m), run.context.ego_persona) for name in REFERENCES]
+    egos = [mixture_of(reference_driver(name, scene.world), run.context.ego_persona) for name in REFERENCES]
     arms = [replace(seatless, drivers=(ego, *seatless.drivers[1:])) for ego in egos]
     found: dict[int, dict[str, dict[str, str]]] = {}
     for first in range(0, len(episodes), _GAMES_AT_ONCE):

@@ -205,7 +205,7 @@ def _body(persona: Persona) -> Iterator[str]:
         yield f"At {NEAR_M:g} m, the error of closing speeds is {error_mps:.2g} m/s (standard deviation)."
     if sight.distance_error or sight.closing_error_per_s:
         yield f"An error of perception lasts for about {PERSISTENCE_S:g} s."
-    shortest, longest = human_factors.reaction.delay_s
+    shortest, longest = human_factors.delay_s
     if longest > 0.0:
         length = f"{shortest:g}" if shortest == longest else f"{shortest:g} to {longest:g}"
         speed, distance_m = f"{DRIFT_SPEED_MPS * 3.6:.0f} km/h", DRIFT_SPEED_MPS * longest

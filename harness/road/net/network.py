@@ -226,7 +226,7 @@ def rail_lines(net: Net, area: BaseGeometry, own: Collection[Edge] = ()) -> list
     kept = set(edges_near(net, own))
     nodes = set(nodes_of(kept))
     openings = [
-        shapely.LineString(_cross_section(lane, at_end)).buffer(_OPENING_M, cap_style="square")
+        shapely.LineString(_end_of(lane, at_end)).buffer(_OPENING_M, cap_style="square")
         for edge in net.getEdges(withInternal=False)
         for at_end, node in ((False, edge.getFromNode()), (True, edge.getToNode()))
         if (_is_fringe(edge, at_end) if edge in kept else node in nodes)
@@ -235,7 +235,7 @@ def rail_lines(net: Net, area: BaseGeometry, own: Collection[Edge] = ()) -> list
     outline = area.boundary
     rails = shapely.difference(outline, shapely.union_all(openings)) if openings else outline
     merged = shapely.line_merge(rails) if rails.geom_type == "MultiLineString" else rails
-    return [np.asarray(line.coords) for line in getattr(merged, "geoms", [merged]) if len(line.coords) > 1]
+    return [np.asarray(line.coords) for line in shapely.get_parts(merged) if len(line.coords) > 1]
 
 
 def rails(lines: Sequence[FloatArray], radius_m: float = _RADIUS_M) -> Rails:
@@ -291,12 +291,10 @@ def _turnarounds_outside(net: Net) -> set[str]:
     }
 
 
-def _cross_section(lane: Lane, at_end: bool) -> FloatArray:
+def _end_of(lane: Lane, at_end: bool) -> FloatArray:
     line = lane_line(lane)
     end, inner = (line[-1], line[-2]) if at_end else (line[0], line[1])
-    along = surface.unit(end - inner)
-    across = 0.5 * lane.getWidth() * np.array([-along[1], along[0]])
-    return np.stack((end - across, end + across))
+    return surface.cross_section(end, end - inner, lane.getWidth())
 
 
 def is_for_cars(link: Connection) -> bool:

@@ -159,6 +159,13 @@ def unit(vector: FloatArray) -> FloatArray:
     return vector / max(float(np.linalg.norm(vector)), 1e-9)
 
 
+def cross_section(point: FloatArray, along: FloatArray, width_m: float) -> FloatArray:
+    """[2, 2] the line of a width across a direction, with its middle at a point, from right to left."""
+    direction = unit(along)
+    across = 0.5 * width_m * np.array([-direction[1], direction[0]])
+    return np.stack((point - across, point + across))
+
+
 def length_of(line: FloatArray) -> float:
     """The length of a line [n, 2]."""
     return float(np.hypot(*np.diff(line, axis=0).T).sum())

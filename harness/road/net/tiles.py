@@ -9,6 +9,7 @@ import logging
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
+from functools import cache
 from hashlib import sha256
 from math import ceil
 from pathlib import Path
@@ -45,18 +46,11 @@ class Tile:
     junctions: frozenset[str] | None = None
     """Only these junctions of the net and their edges are copied; None: all of it."""
 
-    @property
-    def part(self) -> tuple[Path, frozenset[str] | None]:
-        return self.net_file, self.junctions
-
 
 def write_tiles(tiles: Sequence[Tile], file: Path) -> None:
     """Write a net with all tiles; its attributes, types and projection are those of the first net."""
-    read: dict[tuple[Path, frozenset[str] | None], _Net] = {}
-    for tile in tiles:
-        if tile.part not in read:
-            read[tile.part] = _Net.read(*tile.part)
-    copies = [(tile, read[tile.part]) for tile in tiles]
+    read = cache(_Net.read)
+    copies = [(tile, read(tile.net_file, tile.junctions)) for tile in tiles]
     root = copies[0][1].root
     with file.open("w", encoding="utf-8") as out:
         attributes = {name: value for name, value in root.attrib.items() if not name.startswith("{")}

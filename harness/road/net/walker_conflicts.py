@@ -25,7 +25,7 @@ from harness.road.net.network import lane_line
 from harness.road.net.right_of_way_table import extent_of
 from harness.road.net.route_table import route_points
 from harness.road.net.stream import CORRIDOR_M, USERS, Feeders, Piece, Stream, carries_traffic, samples_on
-from harness.road.net.surface import lane_shape
+from harness.road.net.surface import cross_section, lane_shape
 
 WALKERS_STREAM_M = 3.0
 """Width of a way: a walker that is farther beside it is not in its stream."""
@@ -179,9 +179,7 @@ def stripes(ways: Sequence[FloatArray], carriageway: BaseGeometry) -> Iterator[F
 def _painted(ends: FloatArray) -> Iterator[FloatArray]:
     line = shapely.LineString(ends)
     for station_m in np.arange(_STRIPE_M, line.length, 2.0 * _STRIPE_M):
-        near, far = (
-            shapely.get_coordinates(line.interpolate(station_m + side * 0.5 * _STRIPE_M))[0] for side in (-1.0, 1.0)
-        )
-        along = (far - near) / np.hypot(*(far - near))
-        across = 0.5 * _LONG_M * np.array([-along[1], along[0]])
-        yield np.array([near - across, far - across, far + across, near + across, near - across])
+        places_m = station_m + 0.5 * _STRIPE_M * np.array([-1.0, 1.0])
+        near, far = shapely.get_coordinates(shapely.line_interpolate_point(line, places_m))
+        (right, left), (far_right, far_left) = (cross_section(end, far - near, _LONG_M) for end in (near, far))
+        yield np.array([right, far_right, far_left, left, right])

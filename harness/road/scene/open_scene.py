@@ -120,7 +120,8 @@ class OpenScene:
         """The distribution of initial states for players with these human factors and probabilities of taking part.
 
         A player with several drivers has the human factors of each, and the `shares` [P][n] of the games of each. The
-        ego is a machine and has none. In `along_route_share` of the games, players start anywhere along their routes.
+        ego is a machine and has none. In `along_route_share` of the games of a player alone, it starts anywhere along
+        its route.
         """
         varies = self.document.varies
         factors_of = [[each] if isinstance(each, HumanFactors) else list(each) for each in human_factors]

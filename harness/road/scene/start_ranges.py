@@ -27,7 +27,7 @@ def start_range(role: str, *, files: SceneFiles, route: Route, ego_route: Route)
     """The range of a player's start. `route` begins at the edge of its start. Raises UsageError if it is impossible."""
     file, player = files.file, files.document.player(role)
     if player.lane is not None:
-        return _on_lane(role, files, network.find_lane(files.net, file, f"{role}.lane", player.lane), route)
+        return _on_lane(role, files, files.net.getLane(player.lane), route)
     line = route_points(route)[: int(route.length_m / SPACING_M) + 1]
     if player.route_m is not None:
         low, high = player.route_m
@@ -64,11 +64,9 @@ def _on_lane(role: str, files: SceneFiles, lane: Lane, route: Route) -> StartRan
 
 def _beside_ego(role: str, files: SceneFiles, lane: Lane) -> tuple[float, float]:
     file, document = files.file, files.document
-    ego_m, ego_lane_name = document.ego.position_m, document.ego.lane
+    ego_m = document.ego.position_m
     assert ego_m is not None, "the document says that the ego has a position"
-    assert ego_lane_name is not None, "a position is along a lane"
-    ego_lane = network.find_lane(files.net, file, "ego.lane", ego_lane_name)
-    if ego_lane.getEdge() is not lane.getEdge():
+    if files.net.getLane(document.ego.lane).getEdge() is not lane.getEdge():
         message = "needs both to start on the same edge"
         raise UsageError.of(file, f"{role}.beside_ego_m", message, "give position_m instead")
     beside_ego_m = document.player(role).beside_ego_m
