@@ -50,7 +50,8 @@ def open_league(
         raise UsageError.of("--out", str(folder), "is a file", "name a folder")
     problems: list[Problem] = []
     names = scenes or shipped_names("networks")
-    found = [collect(problems, partial(_scene_at, each)) for each in names]
+    found = list(dict.fromkeys(collect(problems, partial(_scene_at, each)) for each in names))
+    problems += _same_names([each for each in found if each is not None])
     driver = collect(problems, partial(_driver, ego, folder / _EGOS, allow_code))
     if ego == SUMO and shield is not None:
         message = "SUMO drives this ego, and has no decision that a shield could check"
@@ -58,7 +59,7 @@ def open_league(
     if problems or driver is None:
         raise UsageError(problems)
     opened = []
-    for scene in dict.fromkeys(filter(None, found)):
+    for scene in filter(None, found):
         for campaign in _campaigns(scene, {"driver": driver} | ({"shield": shield} if shield else {}), episodes):
             file = folder / _CAMPAIGNS / f"{campaign['name']}.toml"
             make_folder(file.parent)
@@ -70,8 +71,23 @@ def open_league(
 
 
 def name_of(ego: str) -> str:
-    """A short name of an ego of the command line: that of its file, or of its program."""
-    return Path(ego if os.path.exists(ego) else shlex.split(ego)[0]).stem
+    """A short name of an ego of the command line: that of its file, or of its program. Raises UsageError as
+    `open_league` does, if it is neither."""
+    return Path(_words(ego)[0]).stem
+
+
+def _words(ego: str) -> list[str]:
+    """The words of an ego of the command line: one, if it is a file."""
+    if os.path.exists(ego):
+        return [ego]
+    try:
+        words = shlex.split(ego)
+    except ValueError as error:
+        message = f"{ego!r} is no file, and as a command it has a mistake: {error}"
+        raise UsageError.of(_OPTION, "", message, "write quotation marks in pairs") from None
+    if not words:
+        raise UsageError.of(_OPTION, "", f"{ego!r} names no ego", "name one, such as adas")
+    return words
 
 
 def _scene_at(written: str) -> Path:
@@ -79,6 +95,15 @@ def _scene_at(written: str) -> Path:
     if not place.is_dir():
         raise UsageError.of("--scenes", "", *missing_document(written, Path(), "networks"))
     return place
+
+
+def _same_names(scenes: Sequence[Path]) -> Iterator[Problem]:
+    """A problem for each scene with the name of one before it: both would have one run folder."""
+    of_name = dict[str, Path]()
+    for scene in scenes:
+        if (first := of_name.setdefault(scene.name, scene)) != scene:
+            message = f"{first} and {scene} have the same name"
+            yield Problem("--scenes", "", message, "rename one of the folders, or play each in a league of its own")
 
 
 def _campaigns(scene: Path, ego: Mapping[str, str], episodes: int) -> Iterator[Mapping[str, Any]]:
@@ -133,8 +158,8 @@ def _seen(ego: str) -> DriverDocument | None:
             return StableBaselines3.model_validate(
                 {"kind": "stable_baselines3", "file": str(path), "algorithm": algorithm}
             )
-    command = shlex.split(ego)
-    if not os.path.exists(path) and len(command) > 1 and shutil.which(command[0]):
+    command = _words(ego)
+    if len(command) > 1 and shutil.which(command[0]):
         return Process(kind="process", command=command, folder=str(Path.cwd()))
     if path.is_file() and os.access(path, os.X_OK) and path.suffix.lower() not in (".toml", ".fmu"):
         return Process(kind="process", command=[str(path)], folder=str(Path.cwd()))

@@ -50,7 +50,7 @@ _RUNS_CODE = {
     TorchScript: "runs a TorchScript module, which is a program",
     StableBaselines3: "reads a file of Stable-Baselines3, which may contain pickles: reading them can run any code",
 }
-_KIND_OF_SUFFIX = {".fmu": "fmu", ".onnx": "onnx", ".pt": "torchscript"}
+_KIND_OF_SUFFIX = {".fmu": "fmu", ".onnx": "onnx", ".pt": "torchscript", ".zip": "stable_baselines3"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -174,7 +174,7 @@ class ExternalDriver:
             beside = self.place / Path(self.written).name
             named = os.path.relpath(beside) if os.path.exists(beside) else self.written
             remedy = f"see harness check-driver {named}"
-            raise UsageError.of(self.written, "", f"the test decision failed: {cause}", remedy) from error
+            raise UsageError.of(named, "", f"the test decision failed: {cause}", remedy) from error
 
 
 def find_driver(written: str, file: Path, key: str, allow_code: bool) -> ExternalDriver:
@@ -190,9 +190,7 @@ def find_driver(written: str, file: Path, key: str, allow_code: bool) -> Externa
         read_policy(place)
         return ExternalDriver(written=written, place=place, document=None, files=_hashed(policy_files(place)))
     if place.suffix.lower() != ".toml":
-        kind = _KIND_OF_SUFFIX.get(place.suffix.lower(), "stable_baselines3")
-        remedy = f'; or name a TOML document with kind = "{kind}", file = "{place.name}"'
-        check_no_archive(file, key, written, place, remedy=remedy)
+        _check_no_file(file, key, written, place)
     if os.path.exists(place):
         document = read_driver(place)
         if (runs := _RUNS_CODE.get(type(document))) and not allow_code:
@@ -212,6 +210,17 @@ def find_driver(written: str, file: Path, key: str, allow_code: bool) -> Externa
     package = version_of(entry_point(written, file, key))
     document = Python(kind="python", entry_point=written)
     return ExternalDriver(written=written, place=place.parent, document=document, package=package)
+
+
+def _check_no_file(file: Path, key: str, written: str, place: Path) -> None:
+    """Raise UsageError if `place`, written as `written` under `key` in `file`, is a file that needs a document."""
+    kind = _KIND_OF_SUFFIX.get(place.suffix.lower())
+    if kind is None and place.suffix.lower() in ARCHIVES:
+        check_no_archive(file, key, written, place)
+    if os.path.isfile(place):
+        names = f'kind = "{kind}", file = "{place.name}"' if kind else f'kind = "process", command = ["./{place.name}"]'
+        message = f"{written!r} is a file, and no driver document"
+        raise UsageError.of(file, key, message, f"name a TOML document with {names} (docs/egos.md)")
 
 
 def _shipped_policies_as(written: str) -> str:

@@ -160,9 +160,12 @@ def _names(spec: Mapping[str, Any], file: Path, inputs: Mapping[str, Any], outpu
         raise UsageError.of(file, "input", what, remedy)
     shape, kind = inputs[wanted[0]].shape, inputs[wanted[0]].type
     floats = ("tensor(float)", "tensor(double)")
-    if len(shape) != 2 or (isinstance(shape[1], int) and shape[1] != entries) or kind not in floats:
+    games, size = shape if len(shape) == 2 else (0, 0)
+    fits = (not isinstance(games, int) or games == 1) and (not isinstance(size, int) or size == entries)
+    if not fits or kind not in floats:
         what = f"its input {wanted[0]} is {kind} {shape}, not tensor(float) [games, {entries}]"
-        raise UsageError.of(file, "input", what, "the observation is that of harness/Ego-v0")
+        remedy = "the observation is that of harness/Ego-v0, and the number of games is free or 1"
+        raise UsageError.of(file, "input", what, remedy)
     return wanted[0], spec["output"] or outputs[0]
 
 

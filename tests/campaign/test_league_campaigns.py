@@ -40,6 +40,40 @@ def test_ego__of_each_kind_that_can_be_seen(tmp_path: Path) -> None:
     assert name_of(command) == Path(sys.executable).stem
 
 
+@pytest.mark.parametrize(
+    ("ego", "told"),
+    [("", "'' names no ego"), (" ", "' ' names no ego"), ("python3 'drive.py", "a mistake: No closing quotation")],
+)
+def test_ego__that_is_no_command_is_told(ego: str, told: str, tmp_path: Path) -> None:
+    for refused in (name_of, lambda each: open_league(each, ["zebra"], tmp_path, episodes=2)):
+        with pytest.raises(UsageError, match=f"^--ego: .*{told}"):
+            refused(ego)
+
+
+def test_ego__of_a_file_with_a_quotation_mark_in_its_name(tmp_path: Path) -> None:
+    mine = tmp_path / "driver's.toml"
+    shutil.copy(shipped("egos") / "rss.toml", mine)
+    assert drivers(str(mine), tmp_path / "out") == ["rules"]
+    assert name_of(str(mine)) == "driver's"
+
+
+def test_ego__that_fails_the_test_decision_is_named_by_its_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    file = Path("out") / "egos" / f"{Path(sys.executable).stem}.toml"
+    with pytest.raises(UsageError, match=f"^{file}: the test decision failed: .*see harness check-driver {file}"):
+        drivers(f"{sys.executable} nowhere.py", Path("out"), allow_code=True)
+
+
+def test_scenes__of_one_name_are_refused(tmp_path: Path) -> None:
+    for folder in ("old", "new"):
+        shutil.copytree(shipped("networks") / "zebra", tmp_path / folder / "zebra")
+    scenes = [str(tmp_path / folder / "zebra") for folder in ("old", "new", "new")]
+    with pytest.raises(UsageError, match=f"^--scenes: {scenes[0]} and {scenes[1]} have the same name"):
+        open_league("sumo", scenes, tmp_path / "out", episodes=2)
+
+
 def test_people__are_discovered_by_their_seeds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A new person of other seeds has a campaign of its own; egos in the folder are no people."""
     both = People(personas=["paper_distracted", "paper_speedy"], seeds=[11], together=False)

@@ -68,11 +68,24 @@ def test_find__a_wrong_document_is_an_error_with_its_key(text: str, message: str
     assert message in refusal(document(tmp_path, text), tmp_path)
 
 
-@pytest.mark.parametrize("name", ["twin.fmu", "model.zip"])
-def test_find__a_file_without_a_document_gets_the_document_as_remedy(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("name", "keys"),
+    [
+        ("twin.fmu", 'kind = "fmu", file = "twin.fmu"'),
+        ("model.zip", 'kind = "stable_baselines3", file = "model.zip"'),
+        ("mine.onnx", 'kind = "onnx", file = "mine.onnx"'),
+        ("drive.py", 'kind = "process", command = ["./drive.py"]'),
+    ],
+)
+def test_find__a_file_without_a_document_gets_the_document_as_remedy(name: str, keys: str, tmp_path: Path) -> None:
     (tmp_path / name).write_bytes(b"PK")
-    kind = {"twin.fmu": "fmu", "model.zip": "stable_baselines3"}[name]
-    assert f'kind = "{kind}", file = "{name}"' in refusal(name, tmp_path)
+    told = refusal(name, tmp_path)
+    assert f"{name!r} is a file, and no driver document (name a TOML document with {keys} (docs/egos.md))" in told
+
+
+def test_find__an_archive_of_another_library_is_not_read(tmp_path: Path) -> None:
+    (tmp_path / "mine.pkl").write_bytes(b"PK")
+    assert "can carry pickles" in refusal("mine.pkl", tmp_path)
 
 
 def test_find__a_missing_path_gets_the_nearest_as_remedy(tmp_path: Path) -> None:

@@ -93,6 +93,8 @@ def test_onnx__a_name_that_it_has_not_is_an_error(key: str, name: str, known: st
 def test_onnx__another_observation_is_refused(tmp_path: Path, car: Car) -> None:
     with pytest.raises(UsageError, match=r"input obs is tensor\(float\) .*12\], not tensor\(float\) \[games, 98\]"):
         of_onnx(onnx_file(tmp_path / "a.onnx", WEIGHTS[:12], seen=12), car)
+    with pytest.raises(UsageError, match=r"input obs is tensor\(float\) \[4, 98\], .* number of games is free or 1"):
+        of_onnx(onnx_file(tmp_path / "a.onnx", games=4), car)
     (tmp_path / "b.onnx").write_bytes(b"nothing")
     with pytest.raises(UsageError, match="can't be read as an ONNX file"):
         of_onnx(tmp_path / "b.onnx", car)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from harness.evaluation.tables import table_of
 from harness.reports.league_page import league_terminal, render_league, sentence_of
+from tests.support.chromium import opener
 
 ROW: dict[str, Any] = {
     **{"ego": "mine", "shield": "", "scene": "merge", "person": "speedy", "seed": 1, "arm": "naive_vs_speedy"},
@@ -47,3 +49,16 @@ def test_page__of_an_arm_of_which_no_game_was_played() -> None:
     assert league_terminal(table).row_count == 1
     (row,) = table.to_dict("records")
     assert sentence_of(row) == "mine fails in 0 of 0 games against speedy in merge: – (95 %: –)."
+
+
+def test_page__fits_its_window_and_keeps_the_caption_in_sight_where_it_does_not(browser: Any, tmp_path: Path) -> None:
+    people = [ROW | {"person": each} for each in ("paper_distracted", "sumo", "nobody")]
+    file = tmp_path / "league.html"
+    file.write_text(render_league("mine", table_of("league", people), ["merge/report.html"] * 3, []))
+    with opener(browser, file) as open_page:
+        pairings = "document.getElementById('pairings')"
+        assert open_page(width=1280).evaluate(f"{pairings}.offsetWidth <= {pairings}.parentElement.clientWidth")
+        page = open_page(width=600)
+        page.evaluate(f"{pairings}.parentElement.scrollLeft = 100")
+        left, right = page.evaluate(f"(({{left, right}}) => [left, right])({pairings}.caption.getBoundingClientRect())")
+        assert 0 <= left < right <= 600
