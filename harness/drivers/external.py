@@ -215,8 +215,9 @@ def find_driver(written: str, file: Path, key: str, allow_code: bool) -> Externa
 def _check_no_file(file: Path, key: str, written: str, place: Path) -> None:
     """Raise UsageError if `place`, written as `written` under `key` in `file`, is a file that needs a document."""
     kind = _KIND_OF_SUFFIX.get(place.suffix.lower())
-    if kind is None and place.suffix.lower() in ARCHIVES:
-        check_no_archive(file, key, written, place)
+    if kind not in ("fmu", "onnx") and place.suffix.lower() != ".py":
+        remedy = f'; or name a TOML document with kind = "{kind or "stable_baselines3"}", file = "{place.name}"'
+        check_no_archive(file, key, written, place, remedy=remedy)
     if os.path.isfile(place):
         names = f'kind = "{kind}", file = "{place.name}"' if kind else f'kind = "process", command = ["./{place.name}"]'
         message = f"{written!r} is a file, and no driver document"

@@ -224,13 +224,14 @@ def _check_tensors(policy: Policy, inputs: int) -> None:
             raise ValueError(f"{name} has parameters over {_MAX_PARAMETER:g}")
 
 
-def check_no_archive(file: Path, key: str, written: str, path: Path) -> None:
+def check_no_archive(file: Path, key: str, written: str, path: Path, *, remedy: str = "") -> None:
     """Raise UsageError if `path`, written as `written` under `key` in `file`, is a file and not a policy's folder.
 
-    The archive of a training library is never opened, because pickles in it are programs.
+    The archive of a training library is never opened, because pickles in it are programs. `remedy` is added to the
+    message.
     """
     if os.path.isfile(path):
         what = "archives such as .zip, .pt and .pkl can carry pickles, which run code when they are opened"
         message = f"{written!r} is a file: {what}, so the harness does not read them"
         folder = "a policy is a folder with policy.safetensors and policy.json, as under <run>/policies/"
-        raise UsageError.of(file, key, message, folder)
+        raise UsageError.of(file, key, message, folder + remedy)

@@ -72,7 +72,6 @@ def test_find__a_wrong_document_is_an_error_with_its_key(text: str, message: str
     ("name", "keys"),
     [
         ("twin.fmu", 'kind = "fmu", file = "twin.fmu"'),
-        ("model.zip", 'kind = "stable_baselines3", file = "model.zip"'),
         ("mine.onnx", 'kind = "onnx", file = "mine.onnx"'),
         ("drive.py", 'kind = "process", command = ["./drive.py"]'),
     ],
@@ -86,6 +85,10 @@ def test_find__a_file_without_a_document_gets_the_document_as_remedy(name: str, 
 def test_find__an_archive_of_another_library_is_not_read(tmp_path: Path) -> None:
     (tmp_path / "mine.pkl").write_bytes(b"PK")
     assert "can carry pickles" in refusal("mine.pkl", tmp_path)
+    (tmp_path / "model.zip").write_bytes(b"PK")
+    told = refusal("model.zip", tmp_path)
+    assert "can carry pickles" in told
+    assert 'kind = "stable_baselines3", file = "model.zip"' in told
 
 
 def test_find__a_missing_path_gets_the_nearest_as_remedy(tmp_path: Path) -> None:
