@@ -90,12 +90,15 @@ class PackagedPlanner:
         self._views: Sequence[CartesianView] = ()
 
     def reset(self, games: IntArray) -> None:
+        """Reset games [N]."""
         self._driver.reset(games)
 
     def see(self, games: IntArray, views: Sequence[CartesianView]) -> None:
+        """Keep the views [N] for the next decision."""
         self._views = views
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        """The driver's actions [N, 2] from observations [N, SIZE], noise [N, 2] and the views."""
         decided: FloatArray = self._driver.decide(games, observation, noise, self._views)
         return decided
 

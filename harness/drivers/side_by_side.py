@@ -60,8 +60,10 @@ class _OneByOne:
         self._driver = driver
 
     def reset(self, games: IntArray) -> None:
+        """Reset games [N]."""
         self._driver.reset(games)
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        """Actions [N, 2] from observations [N, SIZE] and noise [N, 2]."""
         rows = (slice(k, k + 1) for k in range(len(games)))
         return np.concatenate([self._driver.decide(games[row], observation[row], noise[row]) for row in rows])

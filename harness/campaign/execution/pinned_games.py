@@ -152,6 +152,7 @@ class PinnedGames:
         yield from starts[:_MOST_STARTS]
 
     def _start_of(self, episode: int) -> FloatArray:
+        """[2 P] the start that is drawn for an episode."""
         drawn = draw_initial_state(self._players.scene.usual_starts, *parts_of(self._start_seed, episode))
         return np.concatenate((drawn.position_m, drawn.speed_mps))
 

@@ -17,6 +17,7 @@ from harness.road.demand.route_file import (
     DESIRED_SPEEDS_MPS,
     LEAST_PERIOD_S,
     SIZES_M,
+    STEADY,
     Mix,
     RouteChoice,
     VehicleType,
@@ -25,13 +26,11 @@ from harness.road.demand.stops import stop_in
 from harness.road.xml.xml_file import number_in, number_of, required
 
 _MOST_EDGES = 10_000
-_STEADY = {
-    **{"sigma": 0.0, "speedDev": 0.0},
-    **{"lcStrategic": -1.0, "lcCooperative": 0.0, "lcSpeedGain": 0.0, "lcKeepRight": 0.0},
+_BESIDE_STEADY = {
+    *("id", "vClass", "length", "width", "height", "minGap", "maxSpeed", "speedFactor", "color", "guiShape"),
+    *("accel", "decel", "emergencyDecel", "tau"),
 }
-"""A vType with these numbers stays in its lane and draws no random number, if it has no other attributes but those of
-the next line."""
-_OF_BODY = "id vClass length width height minGap maxSpeed accel decel emergencyDecel speedFactor tau color guiShape"
+"""The attributes that a steady vType may have beside `STEADY`."""
 # the range of each number: above the first value, up to the second
 _RANGES = {
     "length": (0.0, 100.0),
@@ -173,9 +172,10 @@ def _vehicle_type(path: Path, element: ElementTree.Element) -> VehicleType:
 
 
 def _is_steady(element: ElementTree.Element) -> bool:
-    law = {name: number_of(element.get(name, "")) for name in _STEADY}
-    others = element.attrib.keys() - _STEADY.keys() - {*_OF_BODY.split()}
-    return law == _STEADY and not others and not len(element) and not isnan(number_of(element.get("speedFactor", "1")))
+    drawn = len(element) or isnan(number_of(element.get("speedFactor", "1")))  # params, or a distribution
+    others = element.attrib.keys() - STEADY.keys() - _BESIDE_STEADY
+    has_all = all(number_of(element.get(name, "")) == number_of(value) for name, value in STEADY.items())
+    return has_all and not others and not drawn
 
 
 def _mix(

@@ -48,6 +48,15 @@ SHARE = " of the room"
 """The ending of a drawn place across the lane: a share, from -1 (right) to 1 (left), of the room beside the vehicle."""
 EDGE_SHARE = " of the edge"
 """The ending of a drawn place of a person along an edge: a share of its length."""
+STEADY = {
+    "sigma": "0",
+    "speedDev": "0",
+    "lcStrategic": "-1",
+    "lcCooperative": "0",
+    "lcSpeedGain": "0",
+    "lcKeepRight": "0",
+}
+"""A vType with these attributes stays in its lane and draws none of SUMO's random numbers."""
 LEAST_PERIOD_S = 0.05
 MOST_AT_ONCE = 1000  # vehicles of a flow that all depart at its begin
 _LEAST_DENSITY = 1e-9

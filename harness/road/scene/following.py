@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from math import atan2
+from xml.etree import ElementTree
 
 import numpy as np
 import shapely
@@ -17,17 +18,15 @@ from harness.game.arrays import FloatArray
 from harness.game.follower import FOLLOWER
 from harness.game.initial_state import InitialState
 from harness.game.roles import EGO
-from harness.road.demand.route_file import CAR_SIZE_M, Departure, Motion, RouteFile, VehicleType
+from harness.road.demand.route_file import CAR_SIZE_M, STEADY, Departure, Motion, RouteFile, VehicleType
 from harness.road.net import network
 from harness.road.scene.scene_files import SceneFiles
 
 FOLLOWER_TYPE = "harness_follower"
 HARDEST_BRAKING_MPS2 = 6.0
 """Of the vehicle behind, in the fuzzy safety model of UN R157."""
-FOLLOWER_XML = (
-    f'<vType id="{FOLLOWER_TYPE}" emergencyDecel="{HARDEST_BRAKING_MPS2}" sigma="0" speedDev="0" '
-    'lcStrategic="-1" lcCooperative="0" lcSpeedGain="0" lcKeepRight="0"/>'
-)
+_ATTRIBUTES = {"id": FOLLOWER_TYPE, "emergencyDecel": str(HARDEST_BRAKING_MPS2), **STEADY}
+FOLLOWER_XML = ElementTree.tostring(ElementTree.Element("vType", _ATTRIBUTES), encoding="unicode")
 """SUMO's default driver, who keeps the speed limit and stays in its lane; without SUMO's random numbers, which the
 games of an arena share."""
 _CAR_LENGTH_M, _CAR_WIDTH_M = CAR_SIZE_M
