@@ -21,24 +21,34 @@ _POSE = ("x_m", "y_m", "heading_rad")
 _BACKGROUND = (*_POSE, "speed_mps")
 _MOTION = (*_BACKGROUND, "acceleration_mps2", "steering_rad", "station_m")
 _WORDS = np.array([each.word for each in sorted(Outcome)], dtype=object)
-_NO_BACKGROUND = np.zeros(0, dtype=np.int64)
+_OF_STATE = (*_MOTION, "lapsed", "outcome")
+_OF_PLAYER = (*_OF_STATE, "payoff", "shielded")
+_NO_STEPS = np.zeros(0, dtype=np.int64)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Others:
+    """The background vehicles [N] of all games, by game."""
+
+    bounds: IntArray
+    """[G + 1] where the vehicles of each game begin, and where those of the last one end."""
+    texts: NDArray
+    """[2, N] their names and types."""
+    motion: FloatArray
+    """[4, N] the columns of `_BACKGROUND`."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Frame:
-    """All games after a step, or after a reset. No array in it changes before a game of it is reset."""
+    """All games after a step, or after a reset."""
 
-    state: State
-    """Of the players, before one is removed."""
     present: BoolArray
     """[G, P] which players were there before the step."""
-    payoff: FloatArray
-    """[G, P]"""
-    shielded: BoolArray
-    """[G, P] whether a player's shield changed its decision in the step."""
+    players: FloatArray
+    """[C, G, P] the columns of `_OF_PLAYER`, before a player is removed."""
     perceived: dict[str, list[str]]
     """[G] what the ego lost and which ghosts it sees, by column; empty without perception errors."""
-    reading: Reading | None
+    others: _Others | None
     signal_texts: tuple[str, ...]
 
 
@@ -53,6 +63,7 @@ class GameTraces:
         self._steers, self._shields = np.array(steers, dtype=bool), arm.shields
         self._names = arm.trace_schema.names
         self._frames: dict[int, list[_Frame]] = {}
+        self._signal_s: dict[int, list[float]] = {}
 
     def begin(self, games: Sequence[int]) -> None:
         """Games that have been reset begin."""
@@ -60,6 +71,7 @@ class GameTraces:
         nothing = np.zeros(state.present.shape)
         frame = self._frame(state, state.present, nothing, nothing.astype(bool))
         self._frames |= {game: [frame] for game in games}
+        self._signal_s |= {game: state.signal_s[game].tolist() for game in games}
 
     def add(self, present: BoolArray, step: Step) -> None:
         """Add a step to the games that have begun; `present` [G, P] are the players before it."""
@@ -78,8 +90,8 @@ class GameTraces:
         steps = steps[order]
         signals = np.array([frame.signal_texts[game] for frame in frames], dtype=object)
         signal_s = np.full(len(frames), "", dtype=object)
-        signal_s[0] = " ".join(map(repr, frames[0].state.signal_s[game].tolist()))
         state = self._arena.state
+        signal_s[0] = " ".join(map(repr, self._signal_s.pop(game)))
         of_all: dict[str, NDArray] = {
             "episode": np.full(len(steps), episode),
             "step": steps,
@@ -109,12 +121,10 @@ class GameTraces:
     def _frame(self, state: State, present: BoolArray, payoff: FloatArray, shielded: BoolArray) -> _Frame:
         arena = self._arena
         return _Frame(
-            state=state,
             present=present.copy(),
-            payoff=payoff,
-            shielded=shielded,
+            players=np.array([*(getattr(state, name) for name in _OF_STATE), payoff, shielded], dtype=np.float64),
             perceived=self._perceived(state),
-            reading=arena.reading,
+            others=_others(arena.reading) if arena.reading is not None else None,
             signal_texts=tuple(arena.signal_texts),
         )
 
@@ -132,50 +142,56 @@ class GameTraces:
     def _players(self, game: int, frames: Sequence[_Frame]) -> tuple[IntArray, dict[str, NDArray]]:
         """The steps [n] of the players' rows, and their columns [n]."""
         steps, players = np.nonzero(np.array([frame.present[game] for frame in frames]))
-
-        def rows(values: list[NDArray]) -> NDArray:
-            return np.array(values)[steps, players]
-
-        columns = {name: rows([getattr(frame.state, name)[game] for frame in frames]) for name in (*_MOTION, "lapsed")}
+        values = np.array([frame.players[:, game] for frame in frames])[steps, :, players]
+        columns: dict[str, NDArray] = dict(zip(_OF_PLAYER, values.T, strict=True))
         for name in frames[0].perceived:
             texts = np.full((len(frames), len(self._roles)), "", dtype=object)
             texts[:, EGO] = [frame.perceived[name][game] for frame in frames]
             columns[name] = texts[steps, players]
-        outcomes = rows([frame.state.outcome[game] for frame in frames])
         return steps, columns | {
             "player": self._roles[players],
             "vehicle_type": self._types[players],
             "steers": self._steers[players],
-            "payoff": rows([frame.payoff[game] for frame in frames]),
-            "shielded": rows([frame.shielded[game] for frame in frames]),
-            "outcome": _WORDS[outcomes - min(Outcome)],
+            "lapsed": columns["lapsed"].astype(bool),
+            "shielded": columns["shielded"].astype(bool),
+            "outcome": _WORDS[columns["outcome"].astype(np.int64) - min(Outcome)],
         }
 
     def _others(self, game: int, frames: Sequence[_Frame]) -> tuple[IntArray, dict[str, NDArray]]:
         """The steps [n] of the rows of background vehicles, and their columns [n]."""
-        readings = [frame.reading for frame in frames]
-        slots = [_NO_BACKGROUND if each is None else np.flatnonzero(each.present[game]) for each in readings]
-        names = {"player": "names", "vehicle_type": "types"} | {name: name for name in _BACKGROUND}
-        steps = np.repeat(np.arange(len(frames)), [len(each) for each in slots])
-        if not len(steps):
-            return steps, {}
-        there = [(each, slot) for each, slot in zip(readings, slots, strict=True) if each is not None]
-        return steps, {
-            name: np.concatenate([getattr(each, column)[game, slot] for each, slot in there])
-            for name, column in names.items()
-        }
+        there = [
+            (step, each, slice(each.bounds[game], each.bounds[game + 1]))
+            for step, frame in enumerate(frames)
+            if (each := frame.others) is not None and each.bounds[game] < each.bounds[game + 1]
+        ]
+        if not there:
+            return _NO_STEPS, {}
+        steps = np.repeat([step for step, _, _ in there], [rows.stop - rows.start for _, _, rows in there])
+        texts = np.concatenate([each.texts[:, rows] for _, each, rows in there], axis=1)
+        motion = np.concatenate([each.motion[:, rows] for _, each, rows in there], axis=1)
+        return steps, dict(zip(("player", "vehicle_type", *_BACKGROUND), (*texts, *motion), strict=True))
 
     def _obstacles(self, game: int, frames: int) -> tuple[IntArray, dict[str, NDArray]]:
         """The steps [n] of the rows of obstacles, and their columns [n]."""
         obstacles = self._scene.obstacles.each
         if not obstacles:
-            return _NO_BACKGROUND, {}
+            return _NO_STEPS, {}
         poses = dict(zip(_POSE, self._arena.nearby.poses[game].T, strict=True))
         texts = {"player": [each.name for each in obstacles], "vehicle_type": [each.vehicle_type for each in obstacles]}
         columns = poses | {name: np.array(each, dtype=object) for name, each in texts.items()}
         return np.repeat(np.arange(frames), len(obstacles)), {
             name: np.tile(column, frames) for name, column in columns.items()
         }
+
+
+def _others(reading: Reading) -> _Others:
+    """The background vehicles of a reading."""
+    games, slots = np.nonzero(reading.present)
+    return _Others(
+        bounds=np.searchsorted(games, np.arange(len(reading.present) + 1)),
+        texts=np.array([reading.names[games, slots], reading.types[games, slots]], dtype=object),
+        motion=np.array([getattr(reading, name)[games, slots] for name in _BACKGROUND]),
+    )
 
 
 def _blank(column: NDArray, count: int) -> NDArray:

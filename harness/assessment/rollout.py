@@ -35,7 +35,7 @@ from harness.game.seeding import parts_of
 from harness.road.demand.route_file import Departure
 from harness.road.scene.open_scene import OpenScene
 
-SIDE_BY_SIDE = 32
+SIDE_BY_SIDE = 64
 """The most games at once in one simulation."""
 
 

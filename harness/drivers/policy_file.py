@@ -115,6 +115,13 @@ class LearnedDriver:
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
         """Actions [N, 2] from observations [N, SIZE]; `noise` [N, 2] is used if decisions are sampled."""
+        return self._action(observation, noise)
+
+    def decide_apart(self, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        """As `decide`, each action with the bits that it has alone: a product for each row."""
+        return self._action(observation[:, None], noise[:, None])[:, 0]
+
+    def _action(self, observation: FloatArray, noise: FloatArray) -> FloatArray:
         hidden = observation
         for weight, bias in self._layers[:-1]:
             hidden = np.tanh(hidden @ weight + bias)

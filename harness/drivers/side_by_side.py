@@ -43,12 +43,30 @@ def _apart(driver: Driver, *, on_foot: bool) -> Driver | None:
         case ShieldedDriver():
             wrapped = _apart(driver.wrapped, on_foot=on_foot)
             return driver.around(wrapped) if wrapped is not None else None
-        case LearnedDriver() | NetworkDriver():  # they keep no state
+        case LearnedDriver():
+            return _Apart(driver)
+        case NetworkDriver():  # it keeps no state
             return _OneByOne(driver)
         case RulesDriver() | StrongestBraking() | OrdinaryWalker():
             return driver
         case _:
             return driver if on_foot and not driver.takes_over else None
+
+
+class _Apart:
+    """Lets a policy decide each game by a matrix product of its own."""
+
+    takes_over = True
+
+    def __init__(self, driver: LearnedDriver) -> None:
+        self._driver = driver
+
+    def reset(self, games: IntArray) -> None:
+        """Do nothing: each decision depends on the current observation only."""
+
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        """Actions [N, 2] from observations [N, SIZE] and noise [N, 2]."""
+        return self._driver.decide_apart(observation, noise)
 
 
 class _OneByOne:

@@ -44,7 +44,6 @@ def schema_of(*, shielded: bool, perceiving: bool) -> pa.Schema:
 
 
 _SCHEMAS = [schema_of(shielded=shield, perceiving=errors) for shield in (False, True) for errors in (False, True)]
-_TEXTS = [field.name for field in _SCHEMAS[-1] if field.type == _TEXT]
 _NUMBERS = [field.name for field in SCHEMA if field.type == pa.float64()]
 
 
@@ -103,11 +102,11 @@ class TraceReader:
             rows = rows.filter(pyarrow.compute.equal(rows["episode"], episode))
             if not len(rows):
                 raise ValueError(f"it has no trace of episode {episode}")
-            frame = rows.unify_dictionaries().to_pandas()
-            _check_game(frame)
+            frame = rows.cast(_with_strings(rows.schema)).to_pandas()
+            _check_game(rows, frame)
         except (OSError, ValueError, MemoryError, pa.ArrowException) as error:
             raise _damaged(path, error) from None
-        return _with_strings(frame)
+        return frame
 
     def _table(self, segment: pyarrow.dataset.ParquetFileFragment) -> pa.Table:
         place = (segment.path, segment.row_groups[0].id)
@@ -150,10 +149,9 @@ def _row_groups(path: Path) -> Iterator[pa.Table]:
             yield file.read_row_group(number)
 
 
-def _with_strings(frame: pd.DataFrame) -> pd.DataFrame:
-    for name in frame.columns.intersection(_TEXTS):
-        frame[name] = frame[name].astype(str)
-    return frame
+def _with_strings(schema: pa.Schema) -> pa.Schema:
+    """With strings in place of dictionaries."""
+    return pa.schema([field.with_type(pa.string()) if field.type == _TEXT else field for field in schema])
 
 
 def check_traces(path: Path, episodes: Iterable[int]) -> None:
@@ -178,10 +176,10 @@ def _check_schema(schema: pa.Schema) -> None:
         raise ValueError(f"its columns are not those of a trace: {', '.join(different)[:200]}")
 
 
-def _check_game(frame: pd.DataFrame) -> None:
+def _check_game(rows: pa.Table, frame: pd.DataFrame) -> None:
     _check_numbers(frame[_NUMBERS].to_numpy(float))
     steps = frame["step"]
-    if frame.isna().any(axis=None) or not (0 <= steps.min() <= steps.max() <= _MOST_STEPS):
+    if any(column.null_count for column in rows.columns) or not (0 <= steps.min() <= steps.max() <= _MOST_STEPS):
         raise ValueError("it has empty cells, or steps out of range")
     if frame.duplicated(["step", "player"]).any():
         raise ValueError("a road user has two rows in one step")

@@ -39,8 +39,8 @@ from harness.road.scene.open_scene import OpenScene
 
 HOPELESS_GAMES = 10
 """An arm ends if this many games, its first, can't be played for one reason: the others would not be played either."""
-AT_ONCE = 10
-"""Segments that a worker takes at a time, if their games can be played side by side."""
+AT_ONCE = 20
+"""Segments that a worker takes at a time, if their games can be played side by side: the games of most arms."""
 _TRACES = "traces.parquet"
 _HELP_S = 10.0  # the time after which a helper starts no further segment: a stage may wait for it
 _POLL_S = 0.25
@@ -159,22 +159,20 @@ def play_segments(arm: SeatedArm, segments: Sequence[Segment], labels: Mapping[s
         left[:] = [each for each in left if not each.is_played]
         run.on_progress(total - sum(len(each.episodes) for each in left) + playing, total)
 
-    def until_played(part: Sequence[Segment]) -> Iterator[Sequence[Segment]]:
-        while missing := [each for each in part if not each.is_played]:
-            yield from _in_groups(missing, at_once)
-            report()
-            if not all(each.is_played for each in part):  # a helper plays them
-                time.sleep(_POLL_S)
-
-    def in_order() -> Iterator[Sequence[Segment]]:
+    def until_played() -> Iterator[Sequence[Segment]]:
         first = [each for each in segments if each.episodes[0] < HOPELESS_GAMES]
         report()
-        yield from until_played(first)
-        if not run.context.keep_going:
-            _check_hope(arm, first)
-        yield from until_played(segments[len(first) :])
+        while missing := [each for each in segments if not each.is_played]:
+            for group in _in_groups(missing, at_once):
+                yield group
+                if first and not run.context.keep_going and all(each.is_played for each in first):
+                    _check_hope(arm, first)
+                    first = []
+            report()
+            if not all(each.is_played for each in segments):  # a helper plays them
+                time.sleep(_POLL_S)
 
-    _play_free(arm, in_order(), labels, run, on_game=report)
+    _play_free(arm, until_played(), labels, run, on_game=report)
 
 
 def _check_hope(arm: SeatedArm, first: Sequence[Segment]) -> None:
