@@ -18,12 +18,15 @@ import typer
 
 from harness.campaign.results.ci_files import RESULT, write_record
 from harness.campaign.results.league_table import worst_pairings_first
+from harness.config.campaign import Campaign
+from harness.config.toml_reading import read_document
 from harness.evaluation.comparisons.tied_ranks import with_shield
 from harness.evaluation.tables import read_csv, rows_in_json, write_csv
 
 RULES = ("sumo", "adas", "careful_and_competent", "fuzzy", "rss")
 SHIELDED = RULES[1:]  # SUMO's driver has no decision that a shield could check
-LEARNED = tuple(f"all-scenes/{ego}-seed{seed}" for ego in ("naive", "robust") for seed in (61, 62, 63))
+ALL_SCENES = read_document(Path(__file__).parents[2] / "campaigns" / "all-scenes.toml", Campaign)
+LEARNED = tuple(f"all-scenes/{ego}-seed{seed}" for ego in ("naive", "robust") for seed in ALL_SCENES.seeds)
 GAMES = 10
 FOLDER = Path("reports/league")
 PARTS = Path("reports/league-parts")
