@@ -1,8 +1,9 @@
 """Drivers in games that are played side by side: each decides the same, to the last bit, as in a game alone.
 
-The sum of a matrix product depends on the number of its rows in the last bits. A network therefore decides one game
-after the other. Rules are the same numbers in any number of games. Drivers of others (programs, FMUs, packages) are
-asked about one game, as their authors tried them out: they play no games side by side.
+The sum of a matrix product depends on the number of its rows in the last bits. A policy therefore decides each game by
+a product of its own, and a network of others one game after the other. Rules are the same numbers in any number of
+games. Drivers of others (programs, FMUs, packages) are asked about one game, as their authors tried them out: they play
+no games side by side.
 """
 
 from __future__ import annotations

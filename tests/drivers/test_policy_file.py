@@ -125,6 +125,15 @@ def test_learned__samples_by_the_noise_and_the_policys_deviation() -> None:
     np.testing.assert_array_equal(driver.decide(GAMES, inputs, noise), driver.decide(GAMES, inputs, noise))
 
 
+@pytest.mark.parametrize("games", [1, 7, 64])
+@pytest.mark.parametrize("sampled", [False, True])
+def test_learned__decides_apart_with_the_bits_of_each_game_alone(games: int, sampled: bool) -> None:
+    driver, rng = LearnedDriver(some_policy(), sampled), np.random.default_rng(games)
+    observation, noise = rng.normal(size=(games, SIZE)), rng.normal(size=(games, 2))
+    alone = [driver.decide(np.array([k]), observation[k : k + 1], noise[k : k + 1])[0] for k in range(games)]
+    np.testing.assert_array_equal(driver.decide_apart(observation, noise), alone)
+
+
 def test_policy__survives_a_round_trip_through_a_learner() -> None:
     policy = policy_of(learner([8, 6]), {})
     other = learner([8, 6], seed=4)
