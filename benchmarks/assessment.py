@@ -15,7 +15,7 @@ from harness.drivers.shield import ShieldedDriver
 from harness.drivers.sumo import SumoDriver
 from harness.road.scene.open_scene import open_scene
 
-_GAMES = 50
+_GAMES = 100
 _TURNS = 3
 _SCENES = ("paper_merge", "merge", "left_across", "zebra")
 
