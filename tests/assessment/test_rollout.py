@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from errno import ENOSPC
 from pathlib import Path
@@ -211,14 +212,20 @@ def test_batch__drivers_of_others_and_sumo_play_alone(merge: OpenScene) -> None:
 def test_batch__an_error_ends_only_its_game(merge: OpenScene, monkeypatch: pytest.MonkeyPatch) -> None:
     """After an error among games side by side each is played again alone."""
     assessed = arm(open_scene("paper_merge"), RANDOM, RANDOM)
-    alone, decide, starts = side_by_side(assessed, [0], [1], [2]), LearnedDriver.decide, list[int]()
+    alone, starts = side_by_side(assessed, [0], [1], [2]), list[int]()
 
-    def fail(driver: LearnedDriver, games: IntArray, seen: FloatArray, noise: FloatArray) -> FloatArray:
-        if starts[-1] == 1 or len(starts) == 3:
-            raise RuntimeError("out of ideas")
-        return decide(driver, games, seen, noise)
+    def failing(name: str) -> Callable[..., FloatArray]:
+        decide = getattr(LearnedDriver, name)
 
-    monkeypatch.setattr(LearnedDriver, "decide", fail)
+        def fail(driver: LearnedDriver, *inputs: FloatArray) -> FloatArray:
+            if starts[-1] == 1 or len(starts) == 3:
+                raise RuntimeError("out of ideas")
+            return decide(driver, *inputs)
+
+        return fail
+
+    for name in ("decide", "decide_apart"):
+        monkeypatch.setattr(LearnedDriver, name, failing(name))
     games = list(assess_batches(assessed, [[0, 1, 2]], starts.append))
     assert starts == [0, 1, 2, 0, 1, 2]
     assert [game.played["error"] for game in games] == ["", "RuntimeError: out of ideas", ""]
