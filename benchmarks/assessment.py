@@ -16,7 +16,7 @@ from harness.drivers.sumo import SumoDriver
 from harness.road.scene.open_scene import open_scene
 
 _GAMES = 100
-_TURNS = 3
+_TURNS = 2
 _SCENES = ("paper_merge", "merge", "left_across", "zebra")
 
 
