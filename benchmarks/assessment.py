@@ -22,7 +22,7 @@ _SCENES = ("paper_merge", "merge", "left_across", "zebra")
 
 def assessment_table() -> str:
     """In Markdown, for some scenes: the games per second of two learned drivers, without and with a shield around the
-    ego, and of a learned ego among SUMO's drivers, with traces and without metrics. The best of several turns counts.
+    ego, and of a learned ego among SUMO's drivers, with traces and without metrics. The better of two turns counts.
     """
     lines = ["| scene | a learned person | the same, the ego with a shield | SUMO |", "| --- | ---: | ---: | ---: |"]
     for name in _SCENES:

@@ -90,8 +90,8 @@ class GameTraces:
         steps = steps[order]
         signals = np.array([frame.signal_texts[game] for frame in frames], dtype=object)
         signal_s = np.full(len(frames), "", dtype=object)
-        state = self._arena.state
         signal_s[0] = " ".join(map(repr, self._signal_s.pop(game)))
+        state = self._arena.state
         of_all: dict[str, NDArray] = {
             "episode": np.full(len(steps), episode),
             "step": steps,

@@ -38,7 +38,8 @@ from harness.files import make_folder
 from harness.road.scene.open_scene import OpenScene
 
 HOPELESS_GAMES = 10
-"""An arm ends if this many games, its first, can't be played for one reason: the others would not be played either."""
+"""An arm ends if this many games, its first, can't be played for one reason: the others would not be played either.
+Games side by side are all tried first."""
 AT_ONCE = 20
 """Segments that a worker takes at a time, if their games can be played side by side: the games of most arms."""
 _TRACES = "traces.parquet"
