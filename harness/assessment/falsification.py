@@ -5,7 +5,7 @@ player's speed. If SUMO drives a person, the parameters of its driver follow (`g
 of a game is drawn as in an assessment: lapses, decisions, weather, background traffic.
 
 A search is a generator of generations of points, which is sent the losses of each. The games of a generation are played
-side by side where those of an assessment are. The loss is the ego's least time to collision, and 0 where the ego fails.
+side by side, and share SUMO's random numbers. The loss is the ego's least time to collision, and 0 where the ego fails.
 These are the usual searchers of falsification, without a model of the ego (A. Corso et al., "A Survey of Algorithms for
 Black-Box Safety Validation of Cyber-Physical Systems", JAIR 72, 2021).
 """
@@ -122,7 +122,7 @@ def falsify(arm: SeatedArm, searcher: Searcher, *, games: int, repeat: int) -> I
         start = start_at(arm.scene, drawn, *starts_in(arm.scene.places, shares))
         return replace(start, ordinary_driver=ordinary_driver_at(point[2 * players :])) if by_sumo else start
 
-    for game in assess_batches(arm, batches(), start_from=start_from):
+    for game in assess_batches(arm, batches(), start_from=start_from, shared_numbers=True):
         if game.played["error"]:
             raise StageFailed(f"{arm.name}, game {game.played['episode']}: {game.played['error']}")
         losses.append(loss_of(game.record))

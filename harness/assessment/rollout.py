@@ -70,18 +70,21 @@ def assess_batches(
     on_start: Callable[[int], None] = lambda episode: None,
     abandoned: Mapping[int, str] = MappingProxyType({}),
     start_from: Callable[[int, InitialState], InitialState] = lambda episode, drawn: drawn,
+    *,
+    shared_numbers: bool = False,
 ) -> Generator[Game, None, None]:
     """Play batches of episodes, in their order. A game that can't be played, or that has impossible numbers, is a
     record with outcome `error`.
 
     The games of a batch are the same bytes as games alone. They are played side by side if they need no random numbers
-    of SUMO and their drivers can. If anything goes wrong among them, each is played again alone.
+    of SUMO and their drivers can. If anything goes wrong among them, each is played again alone. With `shared_numbers`
+    those that need such numbers are played side by side too: they share them, so that they depend on their batch.
 
     `on_start` gets each episode number before that game is played. Episodes in `abandoned` are not played; their record
     has the reason as its error. `start_from` may change the start that is drawn for an episode.
     Raises SimulationError if SUMO can't load the scene, MemoryError, and OSError if the disk takes no more.
     """
-    for games in assess_arms([arm], batches, on_start, abandoned, start_from):
+    for games in assess_arms([arm], batches, on_start, abandoned, start_from, shared_numbers=shared_numbers):
         yield from games
 
 
@@ -91,10 +94,12 @@ def assess_arms(
     on_start: Callable[[int], None] = lambda episode: None,
     abandoned: Mapping[int, str] = MappingProxyType({}),
     start_from: Callable[[int, InitialState], InitialState] = lambda episode, drawn: drawn,
+    *,
+    shared_numbers: bool = False,
 ) -> Generator[list[Game], None, None]:
     """Play batches of episodes as `assess_batches` does, each episode with every one of several arms, all side by side:
     the games of an episode, one of each arm. The arms are such as `seated_arm.joined` takes."""
-    with _Rollout(arms, on_start, start_from) as rollout:
+    with _Rollout(arms, on_start, start_from, shared_numbers=shared_numbers) as rollout:
         for batch in batches:
             played = [(arm, episode) for episode in batch if episode not in abandoned for arm in range(len(arms))]
             together = rollout.play_together(played)
@@ -118,11 +123,13 @@ class _Rollout:
         arms: Sequence[SeatedArm],
         on_start: Callable[[int], None],
         start_from: Callable[[int, InitialState], InitialState],
+        *,
+        shared_numbers: bool,
     ) -> None:
         self._arms, self._on_start, self._start_from = arms, on_start, start_from
         self._joined, self._first_members = joined(arms)
         self._starts = [_start_distribution(each) for each in arms]
-        self._together = _for_games_together(self._joined)
+        self._together = _for_games_together(self._joined, shared_numbers=shared_numbers)
         self._alone: Arena | None = None
 
     def __enter__(self) -> _Rollout:
@@ -154,7 +161,8 @@ class _Rollout:
         for _, episode in places:
             self._on_start(episode)
         try:
-            with closing(_arena(self._together, _tiles(len(starts)))) as arena:
+            seed = starts[places[0]].seed
+            with closing(_arena(self._together, _tiles(len(starts)), seed)) as arena:
                 return self._play(self._together, arena, starts)
         except Exception as error:
             if isinstance(error, MemoryError) or is_of_disk(error):
@@ -219,23 +227,25 @@ def _weather(scene: OpenScene, start: InitialState) -> dict[str, float]:
     return {name: getattr(start, name) for name in ("friction", "visibility_m") if getattr(varies, name) is not None}
 
 
-def _arena(arm: SeatedArm, games: int) -> Arena:
-    return Arena(arm.scene, games, [seats_of(each, paid=True) for each in arm.drivers], recorded=True)
+def _arena(arm: SeatedArm, games: int, seed: int = 0) -> Arena:
+    return Arena(arm.scene, games, [seats_of(each, paid=True) for each in arm.drivers], seed=seed, recorded=True)
 
 
 def _tiles(games: int) -> int:
     """The tiles for games side by side: a power of two, so that a scene's net is copied for few numbers of tiles."""
-    return min(1 << (games.bit_length() - 1), SIDE_BY_SIDE)
+    return min(1 << (games - 1).bit_length(), SIDE_BY_SIDE)
 
 
 def plays_side_by_side(arm: SeatedArm) -> bool:
     """Whether games of an arm may be played side by side."""
-    return _for_games_together(arm) is not None
+    return _for_games_together(arm, shared_numbers=False) is not None
 
 
-def _for_games_together(arm: SeatedArm) -> SeatedArm | None:
+def _for_games_together(arm: SeatedArm, *, shared_numbers: bool) -> SeatedArm | None:
     """The arm with drivers for games side by side; None if its drivers or SUMO's traffic prevent such games."""
-    drivers = side_by_side(arm.drivers, arm.scene.world.walks) if arm.scene.has_steady_traffic else None
+    if not (arm.scene.has_steady_traffic or shared_numbers):
+        return None
+    drivers = side_by_side(arm.drivers, arm.scene.world.walks, with_sumo=shared_numbers)
     return replace(arm, drivers=drivers) if drivers is not None else None
 
 

@@ -3,7 +3,7 @@
 The sum of a matrix product depends on the number of its rows in the last bits. A policy therefore decides each game by
 a product of its own, and a network of others one game after the other. Rules are the same numbers in any number of
 games. Drivers of others (programs, FMUs, packages) are asked about one game, as their authors tried them out: they play
-no games side by side.
+no games side by side. SUMO's driver decides the same only in games that do not share its random numbers with others.
 """
 
 from __future__ import annotations
@@ -24,13 +24,15 @@ from harness.drivers.shield import ShieldedDriver
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 
 
-def side_by_side(players: Sequence[Mixture | None], walks: BoolArray) -> tuple[Mixture | None, ...] | None:
-    """[P] the players' drivers for games side by side; None if one of them can't play such games. `walks` [P] are on
-    foot: there an ordinary walker drives for SUMO."""
+def side_by_side(
+    players: Sequence[Mixture | None], walks: BoolArray, *, with_sumo: bool
+) -> tuple[Mixture | None, ...] | None:
+    """[P] the players' drivers for games side by side; None if one of them can't play such games, as SUMO's driver
+    unless `with_sumo`. `walks` [P] are on foot: there an ordinary walker drives for SUMO."""
     found = list[Mixture | None]()
     for player, on_foot in zip(players, walks.tolist(), strict=True):
         members = player.members if player is not None else ()
-        drivers = [_apart(each.driver, on_foot=on_foot) for each in members]
+        drivers = [_apart(each.driver, for_sumo=on_foot or with_sumo) for each in members]
         if None in drivers:
             return None
         changed = (replace(each, driver=driver) for each, driver in zip(members, drivers, strict=True) if driver)
@@ -38,11 +40,11 @@ def side_by_side(players: Sequence[Mixture | None], walks: BoolArray) -> tuple[M
     return tuple(found)
 
 
-def _apart(driver: Driver, *, on_foot: bool) -> Driver | None:
-    """A driver for games side by side; None if it can't play such games."""
+def _apart(driver: Driver, *, for_sumo: bool) -> Driver | None:
+    """A driver for games side by side; None if it can't play such games. `for_sumo`: SUMO's driver can."""
     match driver:
         case ShieldedDriver():
-            wrapped = _apart(driver.wrapped, on_foot=on_foot)
+            wrapped = _apart(driver.wrapped, for_sumo=for_sumo)
             return driver.around(wrapped) if wrapped is not None else None
         case LearnedDriver():
             return _Apart(driver)
@@ -51,7 +53,7 @@ def _apart(driver: Driver, *, on_foot: bool) -> Driver | None:
         case RulesDriver() | StrongestBraking() | OrdinaryWalker():
             return driver
         case _:
-            return driver if on_foot and not driver.takes_over else None
+            return driver if for_sumo and not driver.takes_over else None
 
 
 class _Apart:

@@ -74,10 +74,18 @@ def test_falsify__a_generation_side_by_side_has_the_games_of_its_points(
     """The last generation is cut off; the games do not depend on those that are played beside them."""
     assessed = arm(open_scene("paper_merge"), RANDOM, RANDOM)
     together = [repr((game.record, game.trace)) for game in falsify(assessed, searcher, games=25, repeat=1)]
-    monkeypatch.setattr("harness.assessment.rollout.side_by_side", lambda drivers, walks: None)
+    monkeypatch.setattr("harness.assessment.rollout.side_by_side", lambda drivers, walks, with_sumo: None)
     alone = [repr((game.record, game.trace)) for game in falsify(assessed, searcher, games=25, repeat=1)]
     assert together == alone
     assert len(set(together)) == 25
+
+
+def test_falsify__where_sumo_drives_a_generation_is_one_batch(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("harness.assessment.rollout._Rollout.play_alone", None)  # no game is played alone
+    searched = arm(open_scene("paper_merge"), RANDOM, SumoDriver())
+    first, again = ([*falsify(searched, Searcher.RANDOM, games=20, repeat=0)] for _ in range(2))
+    assert [repr(game.trace) for game in first] == [repr(game.trace) for game in again]
+    assert len({repr(game.trace) for game in first}) == 20
 
 
 def test_falsify__games_start_within_the_ranges_of_the_scene_and_sumo_drives_as_told(straight: OpenScene) -> None:

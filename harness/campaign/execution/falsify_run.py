@@ -29,6 +29,7 @@ from harness.evaluation.comparisons.games_to_failure import (
     searches_table,
 )
 from harness.evaluation.competence import gate
+from harness.evaluation.strategies import PersonaNonEgo
 from harness.evaluation.tables import write_csv
 from harness.files import make_folder
 
@@ -43,10 +44,11 @@ class PlannedSearch:
 
 
 def planned_searches(folder: RunFolder, players: RunPlayers, arms: Sequence[str], seed: int) -> list[PlannedSearch]:
-    """The searches of the arms, by default of those of the naive ego: learned people play from random starts, and
-    where SUMO drives for the people each searcher searches. Raises UsageError where the run has no such arm, none of
-    one of the two kinds, or a player that can't drive the scene alone."""
-    named = arms or [each.name for each in players.arms() if each.seed == seed and each.name.startswith(NAIVE_ARMS)]
+    """The searches of the arms, by default of those of the naive ego in which people are as their personas say: learned
+    people play from random starts, and where SUMO drives for the people each searcher searches. Raises UsageError where
+    the run has no such arm, none of one of the two kinds, or a player that can't drive the scene alone."""
+    of_naive = [each for each in players.arms() if each.seed == seed and each.name.startswith(NAIVE_ARMS)]
+    named = arms or [each.name for each in of_naive if not _exchanges_a_trait(each)]
     stages = [players.arm(name, seed) for name in named]
     games = games_by_arm(episodes_of(folder))
     for stage in stages:
@@ -61,6 +63,11 @@ def planned_searches(folder: RunFolder, players: RunPlayers, arms: Sequence[str]
         for stage, sumo in zip(stages, by_sumo, strict=True)
         for searcher in (Searcher if sumo else (Searcher.RANDOM,))
     ]
+
+
+def _exchanges_a_trait(stage: AssessmentStage) -> bool:
+    """Whether a person of an arm has a trait of another persona (`[attribution]`): it never drives alone."""
+    return isinstance(stage.arm.non_ego, PersonaNonEgo) and stage.arm.non_ego.borrowed is not None
 
 
 def carry_out_searches(
