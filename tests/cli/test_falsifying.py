@@ -12,7 +12,7 @@ from harness.errors import USAGE_ERROR
 from harness.evaluation.comparisons.games_to_failure import FAILURE
 from harness.evaluation.tables import read_csv
 from tests.support import shipped
-from tests.support.tiny import SHIPPED, finished, harness
+from tests.support.tiny import PAPER_DISTRACTED, SHIPPED, finished, harness
 
 GAMES, REPEATS = 20, 2
 PERSON = f"naive_vs_{shipped.SPEEDY}"
@@ -43,3 +43,11 @@ def test_falsify__arms_of_one_kind_are_refused(run: Path) -> None:
     done = harness("falsify", run, PERSON)
     assert done.returncode == USAGE_ERROR
     assert "name arms of both, as naive_vs_sumo is one" in done.stdout + done.stderr
+
+
+def test_falsify__by_default_people_are_as_their_personas_say(tmp_path: Path) -> None:
+    run = finished(**SHIPPED, name="falsified_traits", attribution={"baseline": str(PAPER_DISTRACTED)})
+    done = harness("falsify", run, "--games", GAMES, "--repeats", REPEATS, "--out", tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    arms = {PERSON, f"naive_vs_{shipped.DISTRACTED}", "naive_vs_sumo"}
+    assert set(read_csv(tmp_path / "searches.csv")["arm"]) == arms
