@@ -162,7 +162,7 @@ def load(run: str | Path) -> Results:
 
     >>> import harness
     >>> harness.load("reports/merge").accepted
-    False
+    True
     """
     folder = RunFolder(Path(run))
     folder.manifest()
