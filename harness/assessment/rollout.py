@@ -3,7 +3,7 @@
 Episode k has the same initial state in every arm of every training seed. Where a driver of SUMO's draws random numbers,
 SUMO is reloaded for each game with a seed that depends on the episode only, because the games of one simulation share
 them. Games in which it draws none (it drives no player, and other vehicles are steady) are played side by side in one
-simulation; the bytes are the same. A search may let the games of a batch share them: none of them is played alone later.
+simulation; the bytes are the same. A search may let the games of a batch share them: it plays none of them alone later.
 """
 
 from __future__ import annotations
