@@ -35,7 +35,7 @@ class Training(Document):
     games: int = Field(64, ge=1, le=1024)
     """Games played in parallel."""
     minibatch: int = Field(512, ge=8, le=1_000_000)
-    """Steps per gradient step; at most the buffer."""
+    """Steps per gradient step; at most the buffer. The last of a pass is smaller if it does not divide the buffer."""
     epochs: int = Field(10, ge=1, le=100)
     """Passes over the buffer per update."""
     network: list[Annotated[int, Field(ge=1, le=1024)]] = Field([64, 64], min_length=1, max_length=6)

@@ -6,6 +6,7 @@ and every game is reset. So an interrupted training gives the same policy as an 
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
@@ -111,20 +112,23 @@ def _learner(spec: TrainingSpec, environment: JoinedVecEnv, tensorboard: Path | 
     settings = spec.settings
     set_random_seed(seed_of(*spec.parts, "parameters") % 2**32)
     _leave_out_compiler()
-    model = _ALGORITHMS[settings.learner](
-        "MlpPolicy",
-        environment,
-        learning_rate=settings.learning_rate,
-        n_steps=settings.buffer // settings.games,
-        batch_size=settings.minibatch,
-        n_epochs=settings.epochs,
-        gamma=settings.discount,
-        gae_lambda=_GAE_LAMBDA,
-        clip_range=settings.clip,
-        ent_coef=settings.entropy_coefficient,
-        policy_kwargs={"net_arch": list(settings.network), "log_std_init": float(np.log(settings.initial_deviation))},
-        device="cpu",
-    )
+    deviation = float(np.log(settings.initial_deviation))
+    with warnings.catch_warnings():  # the last minibatch of a pass may be smaller
+        warnings.filterwarnings("ignore", "You have specified a mini-batch size")
+        model = _ALGORITHMS[settings.learner](
+            "MlpPolicy",
+            environment,
+            learning_rate=settings.learning_rate,
+            n_steps=settings.buffer // settings.games,
+            batch_size=settings.minibatch,
+            n_epochs=settings.epochs,
+            gamma=settings.discount,
+            gae_lambda=_GAE_LAMBDA,
+            clip_range=settings.clip,
+            ent_coef=settings.entropy_coefficient,
+            policy_kwargs={"net_arch": list(settings.network), "log_std_init": deviation},
+            device="cpu",
+        )
     model.set_logger(configure(str(tensorboard), ["tensorboard"]) if tensorboard else Logger(None, []))
     if spec.initial is not None:
         put_policy(model, spec.initial, settings.initial_deviation)

@@ -251,6 +251,12 @@ def test_train__the_deviation_of_actions_ends_narrow(alone: TrainingSpec, tmp_pa
     assert (np.exp(in_one_go(narrow, tmp_path).policy.tensors["log_deviation"]) <= 0.2 + 1e-6).all()
 
 
+@pytest.mark.filterwarnings("error")
+def test_train__a_minibatch_need_not_divide_the_buffer(alone: TrainingSpec, tmp_path: Path) -> None:
+    uneven = replace(alone, settings=settings(steps=1024, minibatch=96))
+    assert in_one_go(uneven, tmp_path).progress.steps == 1024
+
+
 def test_train__ppo_sees_scaled_payoffs_and_the_curve_does_not(
     alone: TrainingSpec, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
