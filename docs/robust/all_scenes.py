@@ -34,8 +34,6 @@ SHIPPED = {
     if (found := re.search(r"policies/(\w+)/\w+-seed(\d+)/", name))
 }
 """Scenes and training seeds of the people that were shipped when these egos learned."""
-LATER = set(SCENES) - {scene for scene, _ in SHIPPED}
-"""Scenes for which no people were shipped then: the robust egos met SUMO's driver alone there."""
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, help=__doc__)
 Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="The folder of the leagues.")]
 
@@ -73,26 +71,23 @@ def seeds(folder: Folder) -> None:
         egos = {ego: games_of(folder, f"{ego}-seed{seed}") for ego in ("naive", "robust")}
         for ego, games in egos.items():
             known = games["scene"].isin(SCENES)
-            of_person, later = ~games["person"].isin(UNTRAINED), games["scene"].isin(LATER)
-            of_met = met(games, number)
+            of_person, of_met = ~games["person"].isin(UNTRAINED), met(games, number)
             parts = {
                 "alone": known & (games["person"] == NOBODY),
                 "beside SUMO's driver": known & (games["person"] == SUMO_DRIVER),
-                "people that the robust ego has met": known & of_person & of_met & ~later,
-                "other people of scenes where it met some": known & of_person & ~of_met & ~later,
-                "people of scenes where it met none": known & of_person & later,
+                "people that the robust ego has met": known & of_person & of_met,
+                "other people of these scenes": known & of_person & ~of_met,
                 "all games of the other scenes": ~known,
             }
             for part, chosen in parts.items():
                 rows.setdefault((part, ego), []).append(fails(games[chosen]))
         both = egos["naive"].merge(egos["robust"], on=GAME, suffixes=("_naive", "_robust"))
-        with_people = [each for each in SCENES if each not in LATER]
-        both = both[both["scene_naive"].isin(with_people) & ~both["person_naive"].isin(UNTRAINED)]
+        both = both[both["scene_naive"].isin(SCENES) & ~both["person_naive"].isin(UNTRAINED)]
         p_values.append(f"{mcnemar(both['ego_failed_naive'] - both['ego_failed_robust'], 'two-sided'):.2g}")
     for (part, ego), cells in sorted(rows.items(), key=lambda row: list(parts).index(row[0][0])):
         if any(not each.endswith(" of 0") for each in cells):
             print(f"| {part} | {ego} | {' | '.join(cells)} |")
-    print(f"| people of scenes where it met some, both egos | p (McNemar) | {' | '.join(p_values)} |")
+    print(f"| people of these scenes, both egos | p (McNemar) | {' | '.join(p_values)} |")
 
 
 @app.command()

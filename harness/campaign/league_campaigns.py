@@ -71,9 +71,10 @@ def open_league(
 
 
 def name_of(ego: str) -> str:
-    """A short name of an ego of the command line: that of its file, or of its program. Raises UsageError as
-    `open_league` does, if it is neither."""
-    return Path(_words(ego)[0]).stem
+    """A short name of an ego of the command line: that of its file; of a command, that of the first file among its
+    arguments, or of its program. Raises UsageError as `open_league` does, if it is none of them."""
+    program, *arguments = _words(ego)
+    return Path(next((each for each in arguments if Path(each).is_file()), program)).stem
 
 
 def _words(ego: str) -> list[str]:

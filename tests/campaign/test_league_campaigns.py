@@ -37,7 +37,8 @@ def test_ego__of_each_kind_that_can_be_seen(tmp_path: Path) -> None:
     command = f"{sys.executable} '{script}'"
     with pytest.raises(UsageError, match="--allow-code"):
         drivers(command, tmp_path / "e")
-    assert name_of(command) == Path(sys.executable).stem
+    assert name_of(command) == "my drive"
+    assert name_of(f"{sys.executable} -m drive") == Path(sys.executable).stem
 
 
 @pytest.mark.parametrize(
