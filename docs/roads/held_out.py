@@ -3,9 +3,10 @@
     python docs/roads/held_out.py play                   # draws roads, trains egos, and plays them: an hour on one core
     python docs/roads/held_out.py table reports/roads    # the results as a Markdown table
 
-One naive ego learns on the road of a scene, the other also on eight variants of it. Both play on ten other variants. The table has for each of them, and each person there, the share of games in which the
-ego fails, the roads with a failure, and the failures on the worst road. Beside others, roads on which the ego fails
-alone are left out: they say nothing about how it copes with others.
+One naive ego learns on the road of a scene, the other also on eight variants of it. Both play on ten other variants.
+The table has for each of them, and each person there, the share of games in which the ego fails, the roads with a
+failure, and the failures on the worst road. Beside others, roads on which the ego fails alone are left out: they say
+nothing about how it copes with others.
 """
 
 from __future__ import annotations
@@ -44,14 +45,19 @@ def play() -> None:
             if not (folder / f"{scene}_road{seeds[0]}").is_dir():
                 _run("scene", "vary", scene, "--roads", len(seeds), "--seed", seeds[0], "--out", folder)
         held_out = ",".join(str(FOLDER / "held-out" / f"{scene}_road{seed}") for seed in HELD_OUT)
-        for words, seeds in LEARNS_ON.items():
+        for words in LEARNS_ON:
             name = f"{scene}-{words}"
-            roads = [f"learned/{scene}_road{seed}" for seed in seeds]
             document = FOLDER / f"{name}.toml"
-            document.write_text(CAMPAIGN.format(name=name, scene=scene, seed=SEED, roads=roads), encoding="utf-8")
+            document.write_text(campaign_of(scene, words), encoding="utf-8")
             _run("campaign", document, "--out", FOLDER / name)
             ego, out = FOLDER / name / "policies" / f"naive-seed{SEED}", FOLDER / f"{scene}-learned-on-{words}"
             _run("league", "--ego", ego, "--scenes", held_out, "--episodes", GAMES, "--out", out)
+
+
+def campaign_of(scene: str, words: str) -> str:
+    """The campaign in which an ego learns on one road, or on nine."""
+    roads = [f"learned/{scene}_road{seed}" for seed in LEARNS_ON[words]]
+    return CAMPAIGN.format(name=f"{scene}-{words}", scene=scene, seed=SEED, roads=roads)
 
 
 def _run(*words: object) -> None:
