@@ -22,6 +22,7 @@ from cost import cost_table
 from output_blocks import blocks_in, with_outputs
 from pydantic import Field, model_validator
 
+from harness.config.campaign import Campaign
 from harness.config.toml_reading import Document, read_document
 from harness.errors import NOT_ACCEPTED
 from harness.evaluation.strategies import ManyPersonas, strategy_name
@@ -97,7 +98,7 @@ def main(
 def carry_out(step: Step, root: Path) -> None:
     """Carry out one step in a checkout. Raises CalledProcessError or OSError if it fails."""
     if step.campaign:
-        run = root / "reports" / Path(step.campaign).stem
+        run = root / "reports" / read_document(root / step.campaign, Campaign).name
         _run(f"harness campaign {step.campaign}", root, capture=False)
         if step.pack:
             pack(run)

@@ -92,6 +92,17 @@ def test_people__of_a_run_are_its_personas_or_their_one_network_from_its_first_t
     assert [each.name for each in publish.people_of(tmp_path)] == expected
 
 
+def test_carry_out__packs_the_run_folder_that_has_the_name_of_the_campaign(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    commands, packed = list[str](), list[Path]()
+    monkeypatch.setattr(publish, "_run", lambda command, *_, **__: commands.append(command))
+    monkeypatch.setattr(publish, "pack", packed.append)
+    write_campaign(tmp_path, name="other").rename(tmp_path / "campaign.toml")
+    publish.carry_out(publish.Step(campaign="campaign.toml", pack=True), tmp_path)
+    assert (commands, packed) == (["harness campaign campaign.toml"], [tmp_path / "reports" / "other"])
+
+
 def test_carry_out__the_long_tables_of_a_packed_run_are_compressed(tmp_path: Path) -> None:
     for name in publish.LONG_TABLES:
         (tmp_path / f"{name}.csv").write_bytes(b"arm,seed\nnaive_alone,1\n")
