@@ -16,9 +16,8 @@ from typing import Any
 import numpy as np
 import torch
 from stable_baselines3 import PPO
+from stable_baselines3.common import logger, utils
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.logger import Logger, configure
-from stable_baselines3.common.utils import set_random_seed
 
 from harness.config.training import CurvePoint
 from harness.drivers.policy_file import Policy
@@ -110,7 +109,7 @@ def _converged_at(spec: TrainingSpec, progress: Progress) -> int | None:
 
 def _learner(spec: TrainingSpec, environment: JoinedVecEnv, tensorboard: Path | None) -> PPO:
     settings = spec.settings
-    set_random_seed(seed_of(*spec.parts, "parameters") % 2**32)
+    utils.set_random_seed(seed_of(*spec.parts, "parameters") % 2**32)
     _leave_out_compiler()
     deviation = float(np.log(settings.initial_deviation))
     with warnings.catch_warnings():  # the last minibatch of a pass may be smaller
@@ -129,7 +128,7 @@ def _learner(spec: TrainingSpec, environment: JoinedVecEnv, tensorboard: Path | 
             policy_kwargs={"net_arch": list(settings.network), "log_std_init": deviation},
             device="cpu",
         )
-    model.set_logger(configure(str(tensorboard), ["tensorboard"]) if tensorboard else Logger(None, []))
+    model.set_logger(logger.configure(str(tensorboard), ["tensorboard"]) if tensorboard else logger.Logger(None, []))
     if spec.initial is not None:
         put_policy(model, spec.initial, settings.initial_deviation)
         return model
@@ -173,7 +172,7 @@ def _segment(
     on_progress: Callable[[int, int], None],
 ) -> Progress:
     parts = (*spec.parts, "segment", progress.segments)
-    set_random_seed(seed_of(*parts, "learner") % 2**32)
+    utils.set_random_seed(seed_of(*parts, "learner") % 2**32)
     replays = RegretReplays(pool_of(spec), progress.regret) if progress.regret is not None else None
     sample(spec, environment, progress.steps, *parts, replays=replays)
     environment.reload(seed_of(*parts, "sumo") % 2**31)
