@@ -46,11 +46,10 @@ def play() -> None:
                 _run("scene", "vary", scene, "--roads", len(seeds), "--seed", seeds[0], "--out", folder)
         held_out = ",".join(str(FOLDER / "held-out" / f"{scene}_road{seed}") for seed in HELD_OUT)
         for words in LEARNS_ON:
-            name = f"{scene}-{words}"
-            document = FOLDER / f"{name}.toml"
+            run, out = FOLDER / f"{scene}-{words}", FOLDER / f"{scene}-learned-on-{words}"
+            document, ego = run.with_suffix(".toml"), run / "policies" / f"naive-seed{SEED}"
             document.write_text(campaign_of(scene, words), encoding="utf-8")
-            _run("campaign", document, "--out", FOLDER / name)
-            ego, out = FOLDER / name / "policies" / f"naive-seed{SEED}", FOLDER / f"{scene}-learned-on-{words}"
+            _run("campaign", document, "--out", run)
             _run("league", "--ego", ego, "--scenes", held_out, "--episodes", GAMES, "--out", out)
 
 
