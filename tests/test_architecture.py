@@ -21,7 +21,7 @@ from tests.support.repository import PACKAGE, REPOSITORY, SOURCES, label, slow_t
 # Which room may import which others, from the lowest floor to the highest. A room is a module or folder directly under
 # harness/, or a folder in one that has a line of its own. A new arrow is a decision: add it here first.
 # "harness" is the public face, harness/__init__.py: no room imports it.
-GROUND = {"errors", "files", "version", "shipped_documents", "game", "config"}
+GROUND = {"errors", "files", "version", "wording", "shipped_documents", "game", "config"}
 EVALUATION = {"evaluation", "evaluation.comparisons", "evaluation.game_theory"}
 ROAD = {"road.xml", "road.net", "road.demand", "road.scene"}
 CAMPAIGN = {"campaign", "campaign.plan", "campaign.storage", "campaign.execution", "campaign.results"}
@@ -29,10 +29,11 @@ ROOMS: dict[str, set[str]] = {
     "errors": set(),
     "files": {"errors"},
     "version": set(),
+    "wording": set(),
     "shipped_documents": {"errors"},
     "game": set(),
     "config": {"errors", "files", "game"},
-    "evaluation": {"errors", "files", "game"},
+    "evaluation": {"errors", "files", "wording", "game"},
     "evaluation.comparisons": {"errors", "files", "game", "evaluation"},
     "evaluation.game_theory": {"errors", "files", "game", "evaluation", "evaluation.comparisons"},
     "drivers": GROUND,
@@ -49,7 +50,7 @@ ROOMS: dict[str, set[str]] = {
     "environments": GROUND | ROAD | EVALUATION | {"drivers", "sumo"},
     "assessment": GROUND | ROAD | EVALUATION | {"drivers", "sumo", "environments"},
     "training": GROUND | ROAD | {"drivers", "environments"},
-    "campaign.plan": {"errors", "game", "config"} | EVALUATION,
+    "campaign.plan": {"errors", "wording", "game", "config"} | EVALUATION,
     "campaign.storage": {"errors", "files", "version", "config", "campaign.plan"}
     | EVALUATION
     | {"road.scene", "environments"},
@@ -266,7 +267,7 @@ def test_slow_tests__each_line_names_a_test_and_every_room_keeps_fast_ones() -> 
     assert sorted(slow_tests() - known) == []
     fast = {path for path, names in tests.items() if label(path) not in slow_tests() and names - slow_in(path)}
     folders = {path.relative_to(REPOSITORY / "tests").parts[0] for path in fast}
-    modules = {"library", "errors", "files", "version", "shipped_documents", "harness", "__main__"}
+    modules = {"library", "errors", "files", "version", "wording", "shipped_documents", "harness", "__main__"}
     assert {room.split(".")[0] for room in ROOMS} - modules <= folders
 
 

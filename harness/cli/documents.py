@@ -13,6 +13,7 @@ from harness.cli.output import AllowCode, AsJson, console_of_any_encoding, outpu
 from harness.cli.scenes import check_scene, folder_of_scene
 from harness.errors import FAILED, UsageError, plain
 from harness.shipped_documents import document_at
+from harness.wording import counted
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -46,7 +47,7 @@ def check_persona(file: PersonaFile) -> None:
 
     file = document_at(file, "personas")
     persona = new_documents.check_persona(file)
-    sources = f"{len(persona.sources)} source{'' if len(persona.sources) == 1 else 's'}"
+    sources = counted(len(persona.sources), "source")
     print(f"{file} is in order: {persona.name}, {sources}. To see what it means: harness persona show {file}")
 
 

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
+from harness.wording import counted
+
 if TYPE_CHECKING:
     from harness.campaign.plan.stages import Stage
     from harness.campaign.preflight import OpenCampaign
@@ -61,18 +63,14 @@ def work(campaign: OpenCampaign, stages: Sequence[Stage]) -> str:
     rejected = sum(any(isinstance(gate, RejectionGate) for gate in stage.gates) for stage in of_arms)
     if campaign.policies is None:
         most = max((training_settings(document, each).steps for each in trainings), default=document.training.steps)
-        parts = [f"{_counted(len(trainings) - responses, 'training')} of up to {most:,} steps"]
+        parts = [f"{counted(len(trainings) - responses, 'training')} of up to {most:,} steps"]
     else:
         parts = [f"Trained players are read from {campaign.policies}: nothing is trained"]
     if document.best_response is not None:
         budget = f"of up to {document.best_response.steps:,} steps"
-        parts.append(f"{_counted(responses, 'training')} of best responses {budget}")
-    arms = _counted(len(of_arms) - rejected, "arm") + (f" and up to {rejected} of rejected answers" if rejected else "")
-    return ", ".join([*parts, f"{arms} of {_counted(document.assessment.episodes, 'episode')}:"])
-
-
-def _counted(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+        parts.append(f"{counted(responses, 'training')} of best responses {budget}")
+    arms = counted(len(of_arms) - rejected, "arm") + (f" and up to {rejected} of rejected answers" if rejected else "")
+    return ", ".join([*parts, f"{arms} of {counted(document.assessment.episodes, 'episode')}:"])
 
 
 def stage_lines(stages: Sequence[Stage]) -> Iterator[str]:

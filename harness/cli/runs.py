@@ -23,6 +23,7 @@ from harness.cli.output import (
     say_unchecked,
 )
 from harness.errors import UsageError
+from harness.wording import counted
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -128,7 +129,7 @@ def export(
             raise UsageError.of("harness export", " ".join(rest), "is not an arm, an episode and a new folder", remedy)
         export_game(run, rest[0], _episode(rest[1]), seed=seed, folder=folder, formats=formats)
         count = 1
-    print_plain([f"Wrote {count} {'game' if count == 1 else 'games'} to {folder}: games.csv lists them"], console)
+    print_plain([f"Wrote {counted(count, 'game')} to {folder}: games.csv lists them"], console)
 
 
 def _episode(text: str) -> int:

@@ -6,6 +6,8 @@ import re
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+from harness.wording import counted
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -31,14 +33,10 @@ def reasons_of(errors: Iterable[str]) -> list[str]:
     for error in filter(None, errors):
         groups.setdefault(reason_of(error), []).append(error)
     ordered = sorted(groups.values(), key=len, reverse=True)
-    lines = [f"{_games(len(group))}: {_shortened(group[0])}" for group in ordered[:SHOWN]]
+    lines = [f"{counted(len(group), 'game')}: {_shortened(group[0])}" for group in ordered[:SHOWN]]
     if others := sum(map(len, ordered[SHOWN:])):
-        lines.append(f"{_games(others)}: other reasons, in the column error of episodes.csv")
+        lines.append(f"{counted(others, 'game')}: other reasons, in the column error of episodes.csv")
     return lines
-
-
-def _games(count: int) -> str:
-    return f"{count} game{'' if count == 1 else 's'}"
 
 
 def _shortened(error: str) -> str:

@@ -9,6 +9,7 @@ from harness.evaluation.game_theory.best_response_gap import OWN, SEARCH
 from harness.evaluation.gap_verdict import GapVerdict
 from harness.reports.numbers import MINUS, NO_SPACE, SURE, interval, number, p_text, percent, signed, sure
 from harness.reports.run_tables import Row
+from harness.wording import counted
 
 
 def both_sides(persona: str, ego: Row | None, non_ego: Row | None) -> str:
@@ -80,8 +81,7 @@ def _side(player: str, row: Row | None) -> str:
 
 def _budget(row: Row) -> str:
     """What the search had, e.g. "600,000 steps from 2 starts"."""
-    starts = row["search_starts"]
-    return f"{number(row['search_steps'], 0)} steps from {starts} {'start' if starts == 1 else 'starts'}"
+    return f"{number(row['search_steps'], 0)} steps from {counted(row['search_starts'], 'start')}"
 
 
 def _known(row: Row) -> list[str]:

@@ -18,6 +18,7 @@ from harness.reports.differences import CHANCE, effect, p_values, speed_sentence
 from harness.reports.human_ranges import declared_unlike
 from harness.reports.numbers import trimmed
 from harness.reports.run_tables import Row, RunTables, failures_of, played
+from harness.wording import counted
 
 TOO_FEW_TRAININGS = f"trainings like this need {LEAST_TRAININGS} training seeds"
 
@@ -27,7 +28,7 @@ def scope_of(about: About | None, planned: int, seeds: int) -> str:
     if about is None:
         return ""
     too_few = f"; {TOO_FEW_TRAININGS}" if seeds < LEAST_TRAININGS else ""
-    return f"About {about.value}, one of {planned} planned test{'' if planned == 1 else 's'}{too_few}."
+    return f"About {about.value}, one of {counted(planned, 'planned test')}{too_few}."
 
 
 def planned_in_words(tables: RunTables) -> str:
@@ -36,7 +37,7 @@ def planned_in_words(tables: RunTables) -> str:
     for about, frame in ((About.TRAINED_PAIR, tables.comparisons), (About.TRAININGS, tables.over_trainings)):
         planned = frame["planned_tests"].max() if len(frame) else pd.NA
         if not pd.isna(planned):
-            parts.append(f"{planned} planned test{'' if planned == 1 else 's'} about {about.value}")
+            parts.append(f"{counted(planned, 'planned test')} about {about.value}")
     return ", and by itself over ".join(parts)
 
 

@@ -25,6 +25,7 @@ from rich.text import Text
 
 from harness.campaign.execution.stage_run import Event
 from harness.campaign.plan.stages import Stage
+from harness.wording import counted
 
 STARTING = "starting"
 _PACE_S = 600.0  # rates are means over this time: a game of a slow driver takes minutes
@@ -135,7 +136,7 @@ def _done_line(event: Event) -> str:
     if "learned_in" in info:
         return f"done     {event.stage}: from {info['learned_in']}"
     amount = f"{info['steps']:,} steps, {info['stopped']}" if "steps" in info else ""
-    amount = amount or next(f"{info[unit]} {unit}" for unit in ("episodes", "trials") if unit in info)
+    amount = amount or next(counted(info[f"{unit}s"], unit) for unit in ("episode", "trial") if f"{unit}s" in info)
     amount += f", chosen: {info['chosen']}" if "chosen" in info else ""
     errors = f", {info['errors']} errors" if info.get("errors") else ""
     return f"done     {event.stage}: {amount}{errors} in {info['seconds']:.0f} s"

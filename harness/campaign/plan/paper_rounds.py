@@ -39,6 +39,7 @@ from harness.evaluation.strategies import (
     against_persona,
     persona_alone,
 )
+from harness.wording import counted
 
 
 def plan_paper_rounds(of: SeedStages, personas: Sequence[str]) -> list[Stage]:
@@ -130,8 +131,7 @@ def family_lines(families: Mapping[About, Sequence[PlannedTest]]) -> Iterator[st
         seeds = list(dict.fromkeys(str(asked.seed) for test in tests for asked in test))
         each = "each by itself" if len(tests[0]) == 1 else "together"
         trainings = f"training seeds {', '.join(seeds)} {each}" if len(seeds) > 1 else f"training seed {seeds[0]}"
-        size = f"{len(tests)} test{'' if len(tests) == 1 else 's'}"
-        yield f"Holm's correction over {size} about {about.value}: {named} ({trainings})"
+        yield f"Holm's correction over {counted(len(tests), 'test')} about {about.value}: {named} ({trainings})"
 
 
 def family_records(families: Mapping[About, Sequence[PlannedTest]]) -> list[dict[str, object]]:
