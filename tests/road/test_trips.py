@@ -49,7 +49,7 @@ def test_trip__of_a_mix_has_a_route_for_each_type(tmp_path: Path) -> None:
     ("others", "message"),
     [
         ('<trip id="t" type="van" from="sc" to="cn"/>', "trip t: no route for a passenger leads from 'sc' to 'cn'"),
-        ('<flow id="t" from="wc" to="ce" via="cs" period="2"/>', "trip t: the net has no edge 'cs'"),
+        ('<flow id="t" from="wc" to="ce" via="cs" period="2"/>', "flow t: the net has no edge 'cs'"),
     ],
 )
 def test_trip__without_a_route_is_named(tmp_path: Path, others: str, message: str) -> None:

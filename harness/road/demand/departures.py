@@ -34,7 +34,7 @@ _ALL_THE_TIME_S = (0.0, inf)
 
 def edges_of(departure: Departure, net: Net, routes: RouteFile) -> list[Edge]:
     """The edges of a vehicle's route. Raises UsageError for edges that the net does not have."""
-    key = f"{'person' if departure.on_foot else 'vehicle'} {departure.name}"
+    key = departure.key
     problems: list[Problem] = []
     edges = {
         name: collect(problems, partial(network.find_edge, net, routes.path, key, name))
@@ -75,7 +75,7 @@ def check_departures(
     if unsafe:
         raise UsageError([Problem(str(routes.path), "person", *unsafe)])
     for departure in background:
-        where = (str(routes.path), f"{'person' if departure.on_foot else 'vehicle'} {departure.name}")
+        where = (str(routes.path), departure.key)
         if departure.name in roles and players <= routes.vehicles.keys():
             problems.append(Problem(*where, "has the name of a player, but is not the player's vehicle", "rename it"))
         edges = collect(problems, partial(edges_of, departure, net, routes))

@@ -128,6 +128,13 @@ class Departure:
     """The driver of the vehicle that follows the ego."""
     on_foot: bool = False
     """Whether it is a person, whose edges are those of its walk. The speed may be empty: as its type desires."""
+    element: str = "vehicle"
+    """The element of the route file that describes it, such as a flow."""
+
+    @property
+    def key(self) -> str:
+        """What messages call it: its element and its name."""
+        return f"{self.element} {self.name}"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -131,6 +131,7 @@ def _departure(path: Path, element: ElementTree.Element, named: NamedRoutes, typ
         lateral=_lateral(path, where, element),
         speed_factor=ranged(path, element, "speedFactor", 1.0) if element.get("speedFactor") else None,
         stops=stops,
+        element=element.tag,
     )
     if not choices:
         return replace(departure, trip=_trip(path, where, element, departure))
@@ -179,6 +180,7 @@ def _person(path: Path, element: ElementTree.Element, named: NamedRoutes, types:
         arrival=("", places["arrivalPos"], ""),
         speed_factor=ranged(path, element, "speedFactor", 1.0) if element.get("speedFactor") else None,
         on_foot=True,
+        element=element.tag,
     )
 
 

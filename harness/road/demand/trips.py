@@ -79,7 +79,7 @@ def _find(
     queries: dict[tuple[str, tuple[str, ...]], _Query] = {}
     for trip in trips:
         for edge in dict.fromkeys(trip.trip):
-            collect(problems, partial(network.find_edge, net, routes.path, f"trip {trip.name}", edge))
+            collect(problems, partial(network.find_edge, net, routes.path, trip.key, edge))
         kind = routes.types[trip.vehicle_type]
         walk, drive = (_ON_FOOT, "0"), (kind.vehicle_class, f"{kind.max_speed_mps:g}")
         queries[kind.name, trip.trip] = (*(walk if trip.on_foot else drive), trip.trip)
@@ -93,7 +93,7 @@ def _find(
         if query not in answers:
             way = f"from {' over '.join(map(repr, places[:-1]))} to {places[-1]!r}"
             message = f"no route for a {vehicle_class} leads {way}"
-            problems.append(Problem(str(routes.path), f"trip {trip.name}", message, "correct its edges or its type"))
+            problems.append(Problem(str(routes.path), trip.key, message, "correct its edges or its type"))
     if problems:
         raise UsageError(sorted(set(problems))[:MOST_PROBLEMS])
     return {key: answers[query] for key, query in queries.items()}

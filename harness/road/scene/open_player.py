@@ -63,7 +63,7 @@ def open_player(role: str, files: SceneFiles, area: BaseGeometry) -> OpenPlayer:
         remedy = f"choose one of its edges (it ends with {names}), or give {role} a goal"
         raise UsageError.of(file, f"{key}.edge", f"edge {each.edge!r} {on_route}", remedy)
     length_m = sum(each.getLength() for each in edges)
-    key = f"vehicle {vehicle.name}"
+    key = vehicle.key
     if length_m > _LONGEST_ROUTE_M:
         message = f"its route is {length_m / 1e3:,.0f} km long, up to {_LONGEST_ROUTE_M / 1e3:g} km are possible"
         raise UsageError.of(routes.path, key, message, "remove edges from the route")
@@ -87,7 +87,7 @@ def lane_route(net: Net, player: Player, edges: Sequence[Edge]) -> LaneRoute:
 def _check_kind(routes: RouteFile, player: Player, vehicle: Departure, edges: Sequence[Edge]) -> None:
     if player.kind not in CYCLING:
         return
-    key, type_name = f"vehicle {vehicle.name}", vehicle.vehicle_type
+    key, type_name = vehicle.key, vehicle.vehicle_type
     vehicle_class = routes.types[type_name].vehicle_class
     if vehicle_class not in _CYCLING_CLASSES:
         message = f"has vClass {vehicle_class!r}, and the scene's player is a {player.kind}"
@@ -137,10 +137,10 @@ def _vehicle(file: Path, role: str, player: Player, routes: RouteFile) -> Depart
         raise UsageError.of(file, f"{role}.vehicle", message, 'give kind = "pedestrian" and its way, or a vehicle')
     if vehicle.vehicle_type not in routes.types:
         message = "a player's type can't be a distribution"
-        raise UsageError.of(routes.path, f"vehicle {vehicle.name}.type", message, "name one vType")
+        raise UsageError.of(routes.path, f"{vehicle.key}.type", message, "name one vType")
     if vehicle.choices:
         message = "a player's route can't be drawn from a distribution"
-        raise UsageError.of(routes.path, f"vehicle {vehicle.name}", message, "give it one route")
+        raise UsageError.of(routes.path, vehicle.key, message, "give it one route")
     fastest_mps = routes.types[vehicle.vehicle_type].max_speed_mps
     if player.speed_mps[1] > fastest_mps:
         message = f"reaches {player.speed_mps[1]:g} m/s, more than the vehicle's maxSpeed"
