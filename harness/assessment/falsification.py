@@ -4,18 +4,18 @@ A point of the unit cube has a share, from 0 to 1, of the scene's range for each
 player's speed. If SUMO drives a person, the parameters of its driver follow (`game.ordinary_driver`). Everything else
 of a game is drawn as in an assessment: lapses, decisions, weather, background traffic.
 
-A search is a generator of generations of points, which is sent the losses of each. The games of a generation are played
-side by side, and share SUMO's random numbers. The loss is the ego's least time to collision, and 0 where the ego fails.
+A search is a generator of generations of points, which is sent the losses of each. The games of a generation, of all
+repeats of a search, are played side by side, and share SUMO's random numbers. The loss is the ego's least time to
+collision, and 0 where the ego fails.
 These are the usual searchers of falsification, without a model of the ego (A. Corso et al., "A Survey of Algorithms for
 Black-Box Safety Validation of Cyber-Physical Systems", JAIR 72, 2021).
 """
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import replace
 from enum import Enum
-from typing import Any
 
 import cmaes
 import numpy as np
@@ -24,9 +24,12 @@ from harness.assessment.rollout import Game, assess_batches
 from harness.assessment.seated_arm import SeatedArm
 from harness.assessment.start_trials import start_at
 from harness.errors import StageFailed
+from harness.evaluation.metrics import Drive, min_ttc_s
 from harness.game.arrays import FloatArray
 from harness.game.follower import RANGES, ordinary_driver_at
 from harness.game.initial_state import InitialState
+from harness.game.outcome import Outcome
+from harness.game.roles import EGO, ROLES
 from harness.game.seeding import generator_of, seed_of
 from harness.game.start_range import starts_in
 
@@ -92,29 +95,34 @@ def _cma_es(dimensions: int, *parts: str | int) -> Generator[FloatArray, Sequenc
         mean = generator_of(*parts, "restart", restart).random(dimensions)
 
 
-def falsify(arm: SeatedArm, searcher: Searcher, *, games: int, repeat: int) -> Iterator[Game]:
-    """Play the games of one search of an arm. Repeats have different random numbers.
+def falsify(arm: SeatedArm, searcher: Searcher, *, games: int, repeats: int) -> Iterator[tuple[int, Game]]:
+    """Play the games of several searches of an arm, of `games` games each: the number of its search, and each game.
+    Each search has random numbers of its own. The generations of all are played side by side.
 
     Raises SimulationError if SUMO can't load the scene, StageFailed where a game can't be played.
     """
     players = len(arm.drivers)
     by_sumo = any(each is not None and not each.takes_over for each in arm.drivers[1:])
     dimensions = 2 * players + (len(RANGES) if by_sumo else 0)
-    episodes = range(FIRST_EPISODE + repeat * games, FIRST_EPISODE + (repeat + 1) * games)
     point_of = dict[int, FloatArray]()
-    losses = list[float]()  # of the games of this generation that were played
+    losses: list[list[float]] = [[] for _ in range(repeats)]  # of the games of this generation, by search
 
-    def batches() -> Iterator[range]:
-        search = generations(searcher, dimensions, arm.seed, "falsification", searcher.value, repeat)
-        points, first = next(search), 0
+    def batches() -> Iterator[list[int]]:
+        searches = [
+            generations(searcher, dimensions, arm.seed, "falsification", searcher.value, repeat)
+            for repeat in range(repeats)
+        ]
+        points, first = [next(search) for search in searches], 0
         while first < games:
-            batch = episodes[first : first + len(points)]
-            point_of.update(zip(batch, points, strict=False))  # the last generation may be longer
+            size = min(len(points[0]), games - first)
+            batch = [FIRST_EPISODE + repeat * games + first + k for repeat in range(repeats) for k in range(size)]
+            point_of.update(zip(batch, (point for each in points for point in each[:size]), strict=True))
             yield batch
-            first += len(batch)
+            first += size
             if first < games:
-                points = search.send(losses.copy())
-                losses.clear()
+                points = [search.send(each.copy()) for search, each in zip(searches, losses, strict=True)]
+                for each in losses:
+                    each.clear()
 
     def start_from(episode: int, drawn: InitialState) -> InitialState:
         point = point_of[episode]
@@ -123,15 +131,23 @@ def falsify(arm: SeatedArm, searcher: Searcher, *, games: int, repeat: int) -> I
         return replace(start, ordinary_driver=ordinary_driver_at(point[2 * players :])) if by_sumo else start
 
     for game in assess_batches(arm, batches(), start_from=start_from, shared_numbers=True):
+        episode = game.played["episode"]
         if game.played["error"]:
-            raise StageFailed(f"{arm.name}, game {game.played['episode']}: {game.played['error']}")
-        losses.append(loss_of(game.record))
-        yield game
+            raise StageFailed(f"{arm.name}, game {episode}: {game.played['error']}")
+        repeat = (episode - FIRST_EPISODE) // games
+        if searcher is not Searcher.RANDOM:  # chance does not look at them
+            losses[repeat].append(loss_of(game))
+        yield repeat, game
 
 
-def loss_of(record: Mapping[str, Any]) -> float:
-    """The loss of a game, from the cells of its row of episodes.csv."""
-    if record.get("ego_failed"):
+def fails(game: Game) -> bool:
+    """Whether the ego fails in a game that was played."""
+    return bool(game.played[f"{ROLES[EGO]}_outcome"] != Outcome.GOAL.word)
+
+
+def loss_of(game: Game) -> float:
+    """The loss of a game that was played."""
+    if fails(game) or game.recorded is None:
         return 0.0
-    time_s = record.get("ego_min_ttc_s")
+    time_s = min_ttc_s(Drive(game=game.recorded, player=EGO))
     return NOT_CLOSE_S if time_s is None else min(float(time_s), NOT_CLOSE_S)

@@ -7,7 +7,7 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from harness.assessment.falsification import NOT_CLOSE_S, Searcher, falsify, generations, loss_of
+from harness.assessment.falsification import FIRST_EPISODE, NOT_CLOSE_S, Searcher, falsify, generations, loss_of
 from harness.drivers.sumo import SumoDriver
 from harness.game.arrays import FloatArray
 from harness.game.follower import RANGES, SPEED_FACTORS, ordinary_driver_at
@@ -55,10 +55,13 @@ def test_generations__of_cma_es_go_on_after_it_has_converged() -> None:
 
 
 def test_loss__is_the_time_to_collision_within_bounds_and_nothing_where_the_ego_fails() -> None:
-    assert loss_of({"ego_failed": 0, "ego_min_ttc_s": 1.5}) == 1.5
-    assert loss_of({"ego_failed": 0, "ego_min_ttc_s": None}) == NOT_CLOSE_S
-    assert loss_of({"ego_failed": 0, "ego_min_ttc_s": 99.0}) == NOT_CLOSE_S
-    assert loss_of({"ego_failed": 1, "ego_min_ttc_s": 0.0}) == 0.0
+    searched = arm(open_scene("paper_merge"), Steady(), RANDOM)
+    games = [game for _, game in falsify(searched, Searcher.RANDOM, games=20, repeats=1)]
+    for game in games:
+        time_s = game.record["ego_min_ttc_s"]
+        far = NOT_CLOSE_S if time_s is None else min(time_s, NOT_CLOSE_S)
+        assert loss_of(game) == (0.0 if game.record["ego_failed"] else far)
+    assert {game.record["ego_failed"] for game in games} == {0, 1}
 
 
 def test_ordinary_driver__has_the_ends_of_the_ranges_at_the_corners_of_the_cube() -> None:
@@ -68,29 +71,51 @@ def test_ordinary_driver__has_the_ends_of_the_ranges_at_the_corners_of_the_cube(
 
 
 @pytest.mark.parametrize("searcher", Searcher)
-def test_falsify__a_generation_side_by_side_has_the_games_of_its_points(
+def test_falsify__generations_of_several_searches_side_by_side_have_the_games_of_their_points(
     searcher: Searcher, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The last generation is cut off; the games do not depend on those that are played beside them."""
     assessed = arm(open_scene("paper_merge"), RANDOM, RANDOM)
-    together = [repr((game.record, game.trace)) for game in falsify(assessed, searcher, games=25, repeat=1)]
+    together = list(falsify(assessed, searcher, games=25, repeats=2))
     monkeypatch.setattr("harness.assessment.rollout.side_by_side", lambda drivers, walks, with_sumo: None)
-    alone = [repr((game.record, game.trace)) for game in falsify(assessed, searcher, games=25, repeat=1)]
-    assert together == alone
-    assert len(set(together)) == 25
+    alone = list(falsify(assessed, searcher, games=25, repeats=2))
+    assert [repr((number, game.record, game.trace)) for number, game in together] == [
+        repr((number, game.record, game.trace)) for number, game in alone
+    ]
+    assert len({repr(game.trace) for _, game in together}) == 50
+    for repeat in (0, 1):
+        first = FIRST_EPISODE + 25 * repeat
+        episodes = [game.played["episode"] for number, game in together if number == repeat]
+        assert episodes == list(range(first, first + 25))
 
 
-def test_falsify__where_sumo_drives_a_generation_is_one_batch(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_falsify__a_search_does_not_depend_on_the_others() -> None:
+    assessed = arm(open_scene("paper_merge"), RANDOM, RANDOM)
+    one, several = (
+        [
+            repr(game.trace)
+            for number, game in falsify(assessed, Searcher.CMA_ES, games=25, repeats=repeats)
+            if not number
+        ]
+        for repeats in (1, 3)
+    )
+    assert one == several
+
+
+def test_falsify__where_sumo_drives_the_generations_are_one_batch(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("harness.assessment.rollout._Rollout.play_alone", None)  # no game is played alone
     searched = arm(open_scene("paper_merge"), RANDOM, SumoDriver())
-    first, again = ([*falsify(searched, Searcher.RANDOM, games=20, repeat=0)] for _ in range(2))
-    assert [repr(game.trace) for game in first] == [repr(game.trace) for game in again]
-    assert len({repr(game.trace) for game in first}) == 20
+    first, again = (
+        [repr(game.trace) for _, game in falsify(searched, Searcher.RANDOM, games=20, repeats=2)] for _ in range(2)
+    )
+    assert first == again
+    assert len({*first}) == 40
 
 
 def test_falsify__games_start_within_the_ranges_of_the_scene_and_sumo_drives_as_told(straight: OpenScene) -> None:
-    games = list(falsify(arm(straight, Steady(), SumoDriver()), Searcher.RANDOM, games=6, repeat=0))
-    again = list(islice(falsify(arm(straight, Steady(), SumoDriver()), Searcher.RANDOM, games=6, repeat=0), 3))
+    searched = arm(straight, Steady(), SumoDriver())
+    games = [game for _, game in falsify(searched, Searcher.RANDOM, games=6, repeats=1)]
+    again = [game for _, game in islice(falsify(searched, Searcher.RANDOM, games=6, repeats=1), 3)]
     assert [game.record for game in games[:3]] == [game.record for game in again]
     assert len({game.played["episode"] for game in games}) == 6
     low, high = straight.places[1].speed_mps

@@ -10,7 +10,7 @@ import pandas as pd
 
 from harness.assessment.conflict_replay import Collision, ConflictReplay, collision_of
 from harness.assessment.continuation import Continuation
-from harness.assessment.falsification import FIRST_EPISODE, Searcher, falsify
+from harness.assessment.falsification import FIRST_EPISODE, Searcher, fails, falsify
 from harness.assessment.rollout import Game
 from harness.assessment.seated_arm import SeatedArm
 from harness.campaign.execution.run_players import RunPlayers
@@ -85,13 +85,14 @@ def carry_out_searches(
     played, total = 0, len(searches) * repeats * games
     for search in searches:
         arm = players.seated(search.stage)
-        for repeat in range(repeats):
-            failures = []
-            for game in falsify(arm, search.searcher, games=games, repeat=repeat):
-                if game.record["ego_failed"]:
-                    failures.append(game)
-                played += 1
-                on_progress(played, total)
+        failures: list[list[Game]] = [[] for _ in range(repeats)]
+        for repeat, game in falsify(arm, search.searcher, games=games, repeats=repeats):
+            if fails(game):
+                failures[repeat].append(game)
+            played += 1
+            on_progress(played, total)
+        for repeat, failed in enumerate(failures):
+            first = FIRST_EPISODE + repeat * games
             yield SearchResult(
                 arm=arm.name,
                 seed=search.stage.seed,
@@ -100,8 +101,8 @@ def carry_out_searches(
                 repeat=repeat,
                 games=games,
                 found={
-                    criterion: [episode - FIRST_EPISODE - repeat * games + 1 for episode in episodes]
-                    for criterion, episodes in _by_criterion(arm, failures).items()
+                    criterion: [episode - first + 1 for episode in episodes]
+                    for criterion, episodes in _by_criterion(arm, failed).items()
                 },
             )
 
