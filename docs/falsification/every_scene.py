@@ -40,7 +40,8 @@ app = typer.Typer(no_args_is_help=True, add_completion=False)
 def play() -> None:
     """Play the leagues and the searches, and write the table. Run it again to continue."""
     for ego in EGOS:
-        _run("league", "--ego", ego, "--episodes", LEAGUE_GAMES, "--out", league_of(ego))
+        if not (league_of(ego) / "league.csv").exists():
+            _run("league", "--ego", ego, "--episodes", LEAGUE_GAMES, "--out", league_of(ego))
     searches = [(ego, *found) for ego in EGOS for found in searchable(read_csv(league_of(ego) / "league.csv"))]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         tables = list(pool.map(lambda search: searched(*search), searches))
