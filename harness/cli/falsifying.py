@@ -61,21 +61,30 @@ def _shown(searches: pd.DataFrame) -> Table:
     from harness.reports.text_table import add_text_row, text_table
 
     criteria = list(dict.fromkeys(searches["criterion"]))
-    headings = ("arm", "starts", *(each.replace("_", " ") for each in criteria))
+    headings = ("person", "starts", *(each.replace("_", " ") for each in criteria))
+    repeats = searches["repeat"].nunique()
     table = text_table(
         headings,
-        whole=("arm", "starts"),
-        title="Mean games until the ego fails, and until it fails in a game that a reference driver prevents",
-        caption="In brackets: searches that found one.",
+        whole=("person", "starts"),
+        title="Mean games until a failure of the ego, and until one that a reference driver prevents",
+        caption=f"In brackets: of {repeats} searches, those that found one. The others count with their length.",
     )
     for (arm, searcher), rows in searches.groupby(["arm", "searcher"], sort=False):
         cells = []
         for criterion in criteria:
             first = rows.loc[rows["criterion"] == criterion, "first_game"]
-            mean = first.fillna(rows["games"].iloc[0]).astype(float).mean()
-            cells.append(f"{mean:.0f} ({first.notna().sum()}/{len(first)})")
-        add_text_row(table, arm, searcher, *cells)
+            cells.append(_games_until(first, rows["games"].iloc[0]))
+        add_text_row(table, str(arm).partition("_vs_")[2], searcher, *cells)
     return table
+
+
+def _games_until(first: pd.Series, games: int) -> str:
+    """The mean of the games until the first find; a search of `games` games without one makes it a lower bound."""
+    finds = int(first.notna().sum())
+    if not finds:
+        return "none"
+    bound = "≥ " if finds < len(first) else ""
+    return f"{bound}{first.fillna(games).astype(float).mean():.0f} ({finds})"
 
 
 def _sentences(found: pd.DataFrame) -> Iterator[str]:
