@@ -120,7 +120,7 @@ def falsify(arm: SeatedArm, searcher: Searcher, *, games: int, repeats: int) -> 
             yield batch
             first += size
             if first < games:
-                points = [search.send(each.copy()) for search, each in zip(searches, losses, strict=True)]
+                points = [search.send(each) for search, each in zip(searches, losses, strict=True)]
                 for each in losses:
                     each.clear()
 

@@ -56,7 +56,7 @@ def over_trainings_sentence(row: Row, tables: RunTables, who: str) -> str:
         case Verdict.BEFORE_HOLM_ONLY:
             return f"{found}: significant without correction, but not after Holm's correction."
         case Verdict.NOT_SIGNIFICANT:
-            return f"{found}: {CHANCE}."
+            return f"{found}: {_not_shown(row)}."
         case _:
             return f"{found}: there is nothing to test."
 
@@ -235,13 +235,20 @@ def _failure_sentence(tables: RunTables, row: Row, before: Row, after: Row) -> s
         case Verdict.BEFORE_HOLM_ONLY:
             return f"{counts}: significantly {direction} without correction, but not after Holm's correction."
         case Verdict.NOT_SIGNIFICANT:
-            return f"{counts}: {CHANCE}."
+            return f"{counts}: {_not_shown(row)}."
         case Verdict.NO_DIFFERENCE:
             return (
                 f"{counts}. In each of the {pairs} pairs both games have the same result, so there is nothing to test."
             )
         case _:
             return f"{counts}, {too_few(pairs)}."
+
+
+def _not_shown(row: Row) -> str:
+    """Why a test of failures shows nothing. It asks for a difference in one direction, that of a difference above 0."""
+    if row["mean_difference"] >= 0:
+        return CHANCE
+    return "not more" if row["question"] == "RQ1" else "not fewer"
 
 
 def left_out(row: Row) -> str:

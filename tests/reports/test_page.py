@@ -132,7 +132,7 @@ def failing(**shares):
             "RQ1: not shown",
             f"3 of 60 games against the speedy driver and in 0 of 60 alone: {CHANCE}",
         ),
-        (failing(naive=0.05, retrained=0.2), "RQ2: not shown", f"12 of 60 games, the naive ego in 3 of 60: {CHANCE}"),
+        (failing(naive=0.05, retrained=0.2), "RQ2: not shown", "12 of 60 games, the naive ego in 3 of 60: not fewer."),
         (failing(naive=1), "RQ1: yes", "makes the naive ego fail in 60 of 60 games instead of 0 of 60"),
         (not_played, "RQ1: yes", "makes the naive ego fail in 18 of 60 games instead of 0 of 60"),
         (not_played, "RQ2: not answered", NOT_PLAYED),

@@ -19,6 +19,7 @@ import numpy as np
 from harness.game.arrays import FloatArray
 from harness.game.follower import Follower
 from harness.game.seeding import drawn_index
+from harness.road.demand.route_schema import PEOPLE
 from harness.road.demand.stops import Stop
 
 SIZES_M = {
@@ -126,10 +127,13 @@ class Departure:
     """Of a vehicle that drives already when the game begins. `lane` is then the whole id of its lane."""
     follower: Follower | None = None
     """The driver of the vehicle that follows the ego."""
-    on_foot: bool = False
-    """Whether it is a person, whose edges are those of its walk. The speed may be empty: as its type desires."""
     element: str = "vehicle"
     """The element of the route file that describes it, such as a flow."""
+
+    @property
+    def on_foot(self) -> bool:
+        """Whether it is a person, whose edges are those of its walk. The speed may be empty: as its type desires."""
+        return self.element in PEOPLE
 
     @property
     def key(self) -> str:

@@ -179,7 +179,6 @@ def _person(path: Path, element: ElementTree.Element, named: NamedRoutes, types:
         speed="" if speed is None else f"{speed:g}",
         arrival=("", places["arrivalPos"], ""),
         speed_factor=ranged(path, element, "speedFactor", 1.0) if element.get("speedFactor") else None,
-        on_foot=True,
         element=element.tag,
     )
 
