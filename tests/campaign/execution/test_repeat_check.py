@@ -20,14 +20,14 @@ for line in sys.stdin:
     message = json.loads(line)
     answer = {"protocol": 2}
     if message["type"] == "decide":
-        answer = {"actions": [[int.from_bytes(os.urandom(1), "big") / 256, 0.0] for _ in message["games"]]}
+        answer = {"actions": [[int.from_bytes(os.urandom(8), "big") / 2**64, 0.0] for _ in message["games"]]}
     print(json.dumps(answer), flush=True)
 """
 
 
 @pytest.mark.parametrize("varies", [True, False])
 def test_varying_drivers__are_found_once(varies: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "dice.py").write_text(DICE if varies else DICE.replace("os.urandom(1)", "b'a'"))
+    (tmp_path / "dice.py").write_text(DICE if varies else DICE.replace("os.urandom(8)", "bytes(8)"))
     (tmp_path / "dice.toml").write_text(f'kind = "process"\ncommand = ["{sys.executable}", "dice.py"]\n')
     campaign = write_campaign(tmp_path, ego={"driver": "dice.toml", "persona": str(CAREFUL)})
     opened, folder = open_campaign(campaign, allow_code=True), RunFolder(tmp_path / "run")
