@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
@@ -67,9 +67,13 @@ class RunPlayers:
             ego_persona=Persona.from_record(manifest["ego_persona"]),
             people={name: Persona.from_record(each) for name, each in manifest["persona_documents"].items()},
             ego_driver=driver,
-            policies=policies or policies_of_run(folder.path, document.policies, manifest["hashes"]),
+            policies=policies or self._found_policies(manifest["hashes"]),
         )
         self._players = PlayerFactory(context=context, scene=self.scene)
+
+    def _found_policies(self, hashes: Mapping[str, str]) -> Path | None:
+        names = {name for stage in self._stages for name in stage.reads}
+        return policies_of_run(self._folder.path, self.document.policies, hashes, names)
 
     def arms(self) -> list[AssessmentStage]:
         """The arms in which an ego meets people, with a driver each that this run can make again: none that other arms
@@ -130,22 +134,23 @@ class RunPlayers:
         return planned
 
 
-def policies_of_run(run: Path, written: str | None, hashes: Mapping[str, str]) -> Path | None:
+def policies_of_run(run: Path, written: str | None, hashes: Mapping[str, str], names: Collection[str]) -> Path | None:
     """The folder of policies that a run's campaign wrote as `written`, found again by the checksums of its manifest;
-    None if there is none with the policies of `hashes`. The written path is not trusted.
+    None if there is none with the policies of `names`. The written path is not trusted. `hashes` may have other
+    policies too: an ego's, which is not read from this folder.
 
     Shipped policies are searched, then the path from a folder beside the run folder, such as `campaigns/` beside
     `reports/`, and from the current folder.
     """
-    read = {
-        "/".join(PurePosixPath(name).parts[-2:]): digest
-        for name, digest in hashes.items()
-        if PurePosixPath(name).name in ("policy.json", "policy.safetensors")
-    }
+    read: dict[str, list[str]] = {}
+    for file, digest in hashes.items():
+        path = PurePosixPath(file)
+        if path.parent.name in names and path.name in ("policy.json", "policy.safetensors"):
+            read.setdefault(f"{path.parent.name}/{path.name}", []).append(digest)
     if written is None or not read:
         return None
     ours = shipped("policies")
     folders = sorted(each for each in ours.iterdir() if each.is_dir()) if ours.is_dir() else []
     if not PurePosixPath(written).is_absolute():
         folders += [start / written for start in (run.absolute().parent, run.absolute().parent.parent, Path.cwd())]
-    return next((each for each in folders if all(has_digest(each / name, [read[name]]) for name in read)), None)
+    return next((each for each in folders if all(has_digest(each / name, read[name]) for name in read)), None)
