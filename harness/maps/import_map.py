@@ -71,7 +71,7 @@ def import_map(path: Path, folder: Path, *, left_hand: bool) -> ImportedMap:
         raise UsageError.of(path, "", f"{facts.on_the_left}: traffic keeps to the left", "give --left-hand")
     is_left = left_hand if kind is MapKind.OSM else _is_left(path, facts, left_hand)
     file = folder / "converted.net.xml"
-    note = _convert(path, kind, facts=facts, net_file=file, left_hand=is_left)
+    notes = _convert(path, kind, facts=facts, net_file=file, left_hand=is_left), _cut_roads(facts)
     try:
         check_net(file)
     except UsageError as error:  # about a file that the user does not know
@@ -81,7 +81,7 @@ def import_map(path: Path, folder: Path, *, left_hand: bool) -> ImportedMap:
     except UsageError:
         raise UsageError.of(path, "", *_NO_ROAD) from None
     _check_rotation(path, net, is_left)
-    return ImportedMap(file, net, (note,) if note else ())
+    return ImportedMap(file, net, tuple(filter(None, notes)))
 
 
 def _copied(path: Path, folder: Path, left_hand: bool) -> ImportedMap:
@@ -144,6 +144,18 @@ def _convert(path: Path, kind: MapKind, *, facts: MapFacts, net_file: Path, left
         message = f"netconvert can't convert it: {errors[0].replace(source.name, path.name)}"
         raise UsageError.of(path, "", message, "repair the map, or export it again")
     return f"{crash}; converted without {', '.join(left_out)}" if left_out else ""
+
+
+def _cut_roads(facts: MapFacts) -> str:
+    """A line on the roads that netconvert makes shorter; empty if there are none."""
+    ways = facts.cut_roads
+    if not ways:
+        return ""
+    few, rest = ", ".join(ways[:3]), ", ..." if len(ways) > 3 else ""
+    return (
+        f"roads with nodes that the map does not have are shorter: {len(ways)} of {facts.roads} (way {few}{rest}); "
+        "export whole ways, for instance with osmium extract --strategy complete_ways"
+    )
 
 
 def _with_wide_rings(content: bytes, ways: Collection[str]) -> bytes:

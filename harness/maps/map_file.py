@@ -61,6 +61,8 @@ class MapFacts:
     says_left: bool = False  # it has a tag driving_side=left
     has_layers: bool = False  # some roads of an OpenStreetMap file pass over or under others
     narrow_rings: set[str] = field(default_factory=set)  # ways of roundabouts with one lane and without a width
+    nodes: set[str] = field(default_factory=set)  # of an OpenStreetMap file
+    cut_roads: list[str] = field(default_factory=list)  # ways with nodes that the file does not have before them
     rules: set[str] = field(default_factory=set)  # RHT and LHT, of the roads of an OpenDRIVE file
     broken: tuple[str, str] | None = None  # the first road of an OpenDRIVE file that is not sound, and why
     uneven: str = ""  # the first road with left-hand traffic whose two directions have different lanes
@@ -127,6 +129,7 @@ def facts_of(path: Path, kind: MapKind) -> MapFacts:
 
 def _note_osm(element: Element, facts: MapFacts) -> None:
     if element.tag == "node":
+        facts.nodes.add(element.get("id", ""))
         place = number_of(element.get("lat", "")), number_of(element.get("lon", ""))
         facts.lowest_deg = min(facts.lowest_deg[0], place[0]), min(facts.lowest_deg[1], place[1])
         facts.highest_deg = max(facts.highest_deg[0], place[0]), max(facts.highest_deg[1], place[1])
@@ -136,6 +139,8 @@ def _note_osm(element: Element, facts: MapFacts) -> None:
         tags = {each.get("k", ""): each.get("v", "") for each in element.iter("tag")}
         is_road = tags.get("highway") in _FOR_CARS
         facts.roads += is_road
+        if is_road and any(each.get("ref", "") not in facts.nodes for each in element.iter("nd")):
+            facts.cut_roads.append(element.get("id", ""))
         facts.has_layers |= is_road and tags.get("layer", "").lstrip("+-").strip("0") != ""
         lanes = tags.get("lanes", "2" if tags.get("highway") in _OF_TWO_LANES else "1")
         if is_road and (tags.get("junction"), lanes) == ("roundabout", "1") and not any("width" in key for key in tags):

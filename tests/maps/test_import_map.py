@@ -6,6 +6,7 @@ import re
 import shlex
 from collections.abc import Callable
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 import sumo
@@ -61,6 +62,18 @@ def test_import__a_roundabout_with_a_width_or_two_lanes_stays_as_it_is(
 ) -> None:
     lanes = '<tag k="name" v="Am Kreisel"/><tag k="maxspeed" v="30"/><tag k="lanes" v="1"/>'
     assert ring_widths_m(tmp_path, RING + lanes, RING + tags) == {width_m}
+
+
+def test_import__roads_that_the_edge_of_an_area_cuts_are_named(tmp_path: Path) -> None:
+    assert import_map(TOWN, tmp_path, left_hand=False).notes == ()
+    root = ElementTree.parse(TOWN).getroot()
+    last = root.findall("way[@id='101']/nd")[-1].get("ref")  # way 102 begins there
+    root.remove(next(each for each in root.findall("node") if each.get("id") == last))
+    ElementTree.ElementTree(root).write(tmp_path / "cut.osm")
+    (note,) = import_map(tmp_path / "cut.osm", tmp_path, left_hand=False).notes
+    assert note.startswith(
+        "roads with nodes that the map does not have are shorter: 2 of 11 (way 101, 102); export whole"
+    )
 
 
 def test_import__of_openstreetmap_keeps_the_projection(tmp_path: Path) -> None:
