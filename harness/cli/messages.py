@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -74,17 +74,38 @@ def work(campaign: OpenCampaign, stages: Sequence[Stage]) -> str:
 
 
 def stage_lines(stages: Sequence[Stage]) -> Iterator[str]:
-    """A line for each stage: its kind, its name, the stages before it, and the policies that it reads."""
+    """A line for each stage: its kind, its name, the stages before it, and the policies that it reads. The stages of
+    several training seeds are alike: they share a line, which says what is of the other seeds."""
     from harness.campaign.plan.stages import TrainingStage
 
+    seeds = list(dict.fromkeys(stage.seed for stage in stages))
     for stage in stages:
-        reads = () if isinstance(stage, TrainingStage) else stage.reads
-        after = f"  after {', '.join(stage.needs)}" if stage.needs else ""
-        yield f"  {stage.verb:6s} {stage.id}{after}" + (f"  with {', '.join(reads)}" if reads else "")
+        if stage.seed != seeds[0]:
+            continue
+        policies = () if isinstance(stage, TrainingStage) else stage.reads
+        if len(seeds) == 1:
+            name, needs, reads = stage.id, ", ".join(stage.needs), ", ".join(policies)
+        else:
+            name, needs, reads = stage.name, _of_each_seed(stage, stage.needs), _of_each_seed(stage, policies)
+        after, read = f"  after {needs}" if needs else "", f"  with {reads}" if reads else ""
+        yield f"  {stage.verb:6s} {name}{after}{read}"
+    if len(seeds) > 1:
+        yield f"Each for the training seeds {', '.join(map(str, seeds))}."
+
+
+def _of_each_seed(stage: Stage, ids: Iterable[str]) -> str:
+    """The names of other stages, by id, as a stage of any training seed needs them."""
+    from harness.evaluation.strategies import name_and_seed
+
+    named = [name_and_seed(each) for each in ids]
+    own, others = (
+        dict.fromkeys(name for name, seed in named if (seed == stage.seed) is same) for same in (True, False)
+    )
+    return "; ".join(filter(None, (", ".join(own), ", ".join(others) + " of other seeds" if others else "")))
 
 
 def stage_records(stages: Sequence[Stage]) -> list[dict[str, object]]:
-    """A record for each stage, as `stage_lines` tells it."""
+    """A record for each stage, with its needs and what it reads."""
     return [
         {
             "stage": stage.id,

@@ -121,6 +121,15 @@ def test_check__lists_the_stages_and_writes_nothing(tmp_path: Path, run_command:
     assert list(tmp_path.iterdir()) == [campaign]
 
 
+def test_check__stages_of_several_seeds_share_a_line(run_command: Callable[..., Result]) -> None:
+    lines = run_command("check", REPOSITORY / "campaigns" / "merge-robust.toml").out.splitlines()
+    assert "  derive speedy  after people" in lines
+    assert "  train  robust  after careful, cautious, speedy, tailgater, texting of other seeds" in lines
+    assert "  assess robust_vs_speedy  after robust, speedy" in lines
+    assert "Each for the training seeds 91, 92, 93, 94, 95." in lines
+    assert not any("seed91" in each for each in lines)
+
+
 @pytest.mark.parametrize(
     ("given", "file", "kind", "remedy"),
     [
