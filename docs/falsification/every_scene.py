@@ -1,6 +1,6 @@
 """Learned people against searchers: five egos in every shipped scene.
 
-    python docs/falsification/every_scene.py play                            # an hour and a half on two cores
+    python docs/falsification/every_scene.py play                            # two hours on two cores
     python docs/falsification/every_scene.py verdicts reports/falsification  # who is sooner, by ego and criterion
     python docs/falsification/every_scene.py scenes reports/falsification    # who finds a failure, by scene
 
@@ -25,7 +25,7 @@ from harness.config.toml_reading import read_document
 from harness.drivers.reference_drivers import UPPER_BOUND
 from harness.evaluation.comparisons.games_to_failure import FAILURE, SoonerVerdict
 from harness.evaluation.league_columns import NOBODY, SUMO_DRIVER
-from harness.evaluation.tables import read_csv, write_csv
+from harness.evaluation.tables import read_csv
 
 FIRST_SEED = read_document(Path(__file__).parents[2] / "campaigns" / "all-scenes.toml", Campaign).seeds[0]
 EGOS = ("adas", "careful_and_competent", "rss", *(f"all-scenes/{ego}-seed{FIRST_SEED}" for ego in ("naive", "robust")))
@@ -45,7 +45,7 @@ def play() -> None:
     searches = [(ego, *found) for ego in EGOS for found in searchable(read_csv(league_of(ego) / "league.csv"))]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         tables = list(pool.map(lambda search: searched(*search), searches))
-    write_csv(pd.concat(tables, ignore_index=True), FOLDER / TABLE)
+    pd.concat(tables).to_csv(FOLDER / TABLE, index=False)
 
 
 def league_of(ego: str) -> Path:
@@ -82,7 +82,7 @@ def _run(*words: object) -> None:
 def verdicts(folder: Folder = FOLDER) -> None:
     """Print how many comparisons of a learned person with a searcher have which verdict, by ego and criterion."""
     said = [each.value for each in SoonerVerdict]
-    _print(["ego", "criterion", "comparisons", *said], verdict_rows(read_csv(folder / TABLE)))
+    _print(["ego", "criterion", "comparisons", *said], verdict_rows(pd.read_csv(folder / TABLE)))
 
 
 def verdict_rows(table: pd.DataFrame) -> Iterator[list[object]]:
@@ -97,7 +97,7 @@ def verdict_rows(table: pd.DataFrame) -> Iterator[list[object]]:
 def scenes(folder: Folder = FOLDER) -> None:
     """Print how many searches find a failure, and in brackets one that the upper bound prevents, by scene and ego: of
     the learned person, and of the searcher, with the most."""
-    table = read_csv(folder / TABLE)
+    table = pd.read_csv(folder / TABLE)
     egos = list(dict.fromkeys(table["ego"]))
     _print(["scene", "starts", *(f"`{ego}`" for ego in egos)], scene_rows(table, egos))
 
