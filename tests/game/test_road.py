@@ -132,8 +132,12 @@ def test_approach__comfortable_braking_reaches_a_lower_limit_ahead() -> None:
 # --- rails -----------------------------------------------------------------------------------------------------------
 
 
-POINT = st.tuples(st.floats(-150.0, 150.0), st.floats(-80.0, 80.0))
-SEGMENTS = st.lists(st.tuples(POINT, POINT), min_size=1, max_size=12)
+def to_mm(limit_m: float) -> st.SearchStrategy[float]:
+    return st.integers(round(-1000 * limit_m), round(1000 * limit_m)).map(lambda mm: mm / 1000)
+
+
+POINT = st.tuples(to_mm(150.0), to_mm(80.0))
+SEGMENTS = st.lists(st.tuples(POINT, POINT).filter(lambda ends: ends[0] != ends[1]), min_size=1, max_size=12)
 
 
 @settings(max_examples=60, deadline=None)
